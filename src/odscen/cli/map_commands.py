@@ -120,7 +120,7 @@ def add(
         else:
             rows.append({**_map_row(entry), "source": str(file)})
             if missed := entry.info.get("fidelity", {}).get("not_held"):  # not of older maps
-                log(_unfaithful(entry.name, missed))
+                log(_warn_of_network(entry.name, missed))
             log(_describe_added(entry))
     if as_json:
         print_json({"maps": rows})
@@ -380,7 +380,7 @@ def _map_row(entry: MapEntry) -> dict[str, Any]:
     return row if fidelity is None else {**row, "fidelity": fidelity}
 
 
-def _unfaithful(name: str, missed: list[dict[str, Any]]) -> str:
+def _warn_of_network(name: str, missed: list[dict[str, Any]]) -> str:
     limits = "; ".join(
         f"{verdict['name']} {verdict['value']:g}, limit {verdict['limit']:g}" for verdict in missed
     )

@@ -363,7 +363,7 @@ def _of_files(plan: StudyPlan, workspace: Workspace, beside: Path) -> Iterator[S
     for pattern in plan.scenarios:
         path = beside / pattern
         try:
-            files = [path] if path.is_file() else _matching(beside, pattern)
+            files = [path] if path.is_file() else _matching_files(beside, pattern)
         except (ValueError, NotImplementedError) as error:
             raise InputError(f"scenarios: {pattern!r} is no pattern of files: {error}") from error
         if not files:
@@ -375,7 +375,7 @@ def _of_files(plan: StudyPlan, workspace: Workspace, beside: Path) -> Iterator[S
             yield ScenarioSource(scenario_name(file), entry.name, entry.sha256, dumps(scenario))
 
 
-def _matching(beside: Path, pattern: str) -> list[Path]:
+def _matching_files(beside: Path, pattern: str) -> list[Path]:
     """Files of a pattern that is relative to a folder, or absolute."""
     path = PurePath(pattern)
     if path.is_absolute():

@@ -138,7 +138,7 @@ def build_map(
         "files": FILES if imported is None else {**FILES, "original": imported.original},
         "semantics": map_semantics(odr, table),
         "report": report.to_dict(),
-        "fidelity": _fidelity(verify(network.net_xml, odr, table)),
+        "fidelity": _measure_fidelity(verify(network.net_xml, odr, table)),
         **({} if imported is None else {"import": imported.to_dict()}),
         "build_seconds": round(time.perf_counter() - start, 3),
     }
@@ -147,7 +147,7 @@ def build_map(
     progress("done", 1.0)
 
 
-def _fidelity(fidelity: Fidelity) -> dict[str, Any]:
+def _measure_fidelity(fidelity: Fidelity) -> dict[str, Any]:
     """Whether the SUMO network follows the map, and the limits that are not held."""
     missed = [
         {"name": verdict.name, "value": float(verdict.value), "limit": float(verdict.limit)}

@@ -172,7 +172,9 @@ def _parse_header(root: Element, element: Element | None, notes: Notes) -> Heade
         detail = "there is no <header>; the file is read by the rules of 1.4 to 1.8"
         notes.add(Rule.MISSING_HEADER, root, detail)
         return NO_HEADER
-    major, minor = (_revision(element, *part, notes) for part in (("revMajor", 1), ("revMinor", 4)))
+    major, minor = (
+        _read_revision(element, *part, notes) for part in (("revMajor", 1), ("revMinor", 4))
+    )
     if major != 1 or minor < 0:
         raise refusal(element, f"OpenDRIVE {major}.{minor} is not supported; 1.4 to 1.8 are")
     if not 4 <= minor <= 8:
@@ -186,17 +188,17 @@ def _parse_header(root: Element, element: Element | None, notes: Notes) -> Heade
         rev_major=major,
         rev_minor=minor,
         name=element.get("name", ""),
-        north=_described(element, "north", notes),
-        south=_described(element, "south", notes),
-        east=_described(element, "east", notes),
-        west=_described(element, "west", notes),
+        north=_descriptive_number(element, "north", notes),
+        south=_descriptive_number(element, "south", notes),
+        east=_descriptive_number(element, "east", notes),
+        west=_descriptive_number(element, "west", notes),
         geo_reference=text,
         crs=_parse_crs(text, element, notes),
         offset=_parse_offset(offset, notes),
     )
 
 
-def _revision(element: Element, name: str, usual: int, notes: Notes) -> int:
+def _read_revision(element: Element, name: str, usual: int, notes: Notes) -> int:
     """A part of the version; the oldest one stands for what is no number."""
     text = element.get(name, "").strip()
     if re.fullmatch(r"[-+]?\d{1,9}", text):
@@ -206,7 +208,7 @@ def _revision(element: Element, name: str, usual: int, notes: Notes) -> int:
     return usual
 
 
-def _described(element: Element, name: str, notes: Notes) -> float | None:
+def _descriptive_number(element: Element, name: str, notes: Notes) -> float | None:
     """A number that only describes the file; ``None`` if it is none."""
     try:
         return optional_number(element, name)
@@ -218,7 +220,9 @@ def _described(element: Element, name: str, notes: Notes) -> float | None:
 def _parse_offset(element: Element | None, notes: Notes) -> tuple[float, float, float, float]:
     if element is None:
         return (0.0, 0.0, 0.0, 0.0)
-    x, y, z, hdg = (_described(element, name, notes) or 0.0 for name in ("x", "y", "z", "hdg"))
+    x, y, z, hdg = (
+        _descriptive_number(element, name, notes) or 0.0 for name in ("x", "y", "z", "hdg")
+    )
     return (x, y, z, hdg)
 
 

@@ -158,7 +158,7 @@ def _parse_signal(element: Element, notes: Notes) -> Signal:
             rule = Rule.IGNORED if tag in _SIGNAL_IGNORED else Rule.UNKNOWN
             notes.skip(rule, "signal", tag)
     unit = element.get("unit", "")
-    value = _value(element, notes)
+    value = _parse_value(element, notes)
     factor = speed_factor(unit)
     return Signal(
         id=required(element, "id"),
@@ -182,7 +182,7 @@ def _parse_signal(element: Element, notes: Notes) -> Signal:
     )
 
 
-def _value(element: Element, notes: Notes) -> float | None:
+def _parse_value(element: Element, notes: Notes) -> float | None:
     """The value of a signal, if it is a number: what it means does not depend on it."""
     try:
         return optional_number(element, "value")

@@ -66,7 +66,7 @@ def fit_lengths(
             problem = f"{what}; no road that is linked there shows which one holds"
             faults.append(RoadFault(road.id, OpenDriveError(problem, element=path)))
             continue
-        fitted[road_id] = _fitted(road, length)
+        fitted[road_id] = _fit_road(road, length)
         notes.add(Rule.ROAD_LENGTH, f"road {shown_id(road.id)}", f"{what}; {length:.6g} holds")
     return fitted, faults
 
@@ -85,7 +85,7 @@ def _true_length(
     linked = False
     for x, y in _meeting_points(road, roads, astray):
         linked = True
-        votes |= {length for length in lengths if _meets(_end_at(road, length), x, y)}
+        votes |= {length for length in lengths if _meets_neighbour(_end_at(road, length), x, y)}
     if not linked:
         return lengths[0]
     return votes.pop() if len(votes) == 1 else None
@@ -96,7 +96,7 @@ def _end_at(road: Road, s: float) -> _RoadEnd:
     return _RoadEnd(s, float(points.x[0]), float(points.y[0]), float(points.hdg[0]))
 
 
-def _meets(end: _RoadEnd, x: float, y: float) -> bool:
+def _meets_neighbour(end: _RoadEnd, x: float, y: float) -> bool:
     """Whether a point lies at the end of a road or beside it, not before or behind it."""
     dx, dy = x - end.x, y - end.y
     cos, sin = math.cos(end.hdg), math.sin(end.hdg)
@@ -107,10 +107,10 @@ def _meeting_points(
     road: Road, roads: Mapping[RoadId, Road], astray: Mapping[RoadId, float]
 ) -> Iterator[tuple[float, float]]:
     """Where roads that are linked to the end of a road begin or end."""
-    places = {_place(road.successor)} if road.successor else set()
+    places = {_place_at_end(road.successor)} if road.successor else set()
     for other in roads.values():
         for end, link in (("start", other.predecessor), ("end", other.successor)):
-            if link is not None and _place(link) == (road.id, "end"):
+            if link is not None and _place_at_end(link) == (road.id, "end"):
                 places.add((other.id, end))
     for name, end in sorted(places - {("", "")}):
         other = roads.get(RoadId(name), road)
@@ -123,19 +123,19 @@ def _meeting_points(
             yield at.x, at.y
 
 
-def _place(link: RoadLink | None) -> tuple[str, str]:
+def _place_at_end(link: RoadLink | None) -> tuple[str, str]:
     """Road and end that a link leads to; empty if it leads to none."""
     if link is None or link.element_type != "road" or link.contact_point is None:
         return "", ""
     return link.element_id, link.contact_point
 
 
-def _fitted(road: Road, length: float) -> Road:
+def _fit_road(road: Road, length: float) -> Road:
     """The road with a length, its plan view cut there or led straight on to there."""
     geometry = [geometry for geometry in road.geometry if geometry.s < length]
     last = geometry[-1]
     if last.s + last.length > length:
-        geometry[-1] = _shortened(last, length - last.s)
+        geometry[-1] = _shorten_line(last, length - last.s)
     elif last.s + last.length < length:
         end = _end_at(road, last.s + last.length)
         rest = length - end.s
@@ -145,7 +145,7 @@ def _fitted(road: Road, length: float) -> Road:
     return replace(road, length=length, geometry=tuple(geometry), sections=tuple(sections))
 
 
-def _shortened(geometry: Geometry, length: float) -> Geometry:
+def _shorten_line(geometry: Geometry, length: float) -> Geometry:
     if geometry.kind is GeometryKind.SPIRAL:
         start, end = geometry.params
         params = start, start + (end - start) * length / geometry.length

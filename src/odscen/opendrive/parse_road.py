@@ -70,7 +70,7 @@ def parse_road(element: Element, notes: Notes) -> Road:
             rule = Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN
             notes.skip(rule, "road", tag, len(found))
     link = only(groups, "link")
-    length, is_point = _length(element, link, notes)
+    length, is_point = _parse_length_or_point(element, link, notes)
     lateral = _container_children(groups, "lateralProfile", {"superelevation"}, notes)
     lanes = only(groups, "lanes")
     if lanes is None:
@@ -102,7 +102,9 @@ def parse_road(element: Element, notes: Notes) -> Road:
     )
 
 
-def _length(element: Element, link: Element | None, notes: Notes) -> tuple[float, bool]:
+def _parse_length_or_point(
+    element: Element, link: Element | None, notes: Notes
+) -> tuple[float, bool]:
     """Length of a road, metres, and whether it is a point that joins two roads."""
     length = number(element, "length", limit=MAX_ROAD_LENGTH)
     joined = {} if link is None else children(link)

@@ -124,17 +124,17 @@ def speed(element: Element, notes: Notes) -> float | None:
         notes.add(Rule.SPEED, element, f"max={shown(text)} is not above zero; no speed is given")
         return None
     if unit not in _SPEED_UNITS:
-        notes.add(Rule.SPELLING, element, f"unit={shown(unit)} is read as {_spelt(unit)}")
+        notes.add(Rule.SPELLING, element, f"unit={shown(unit)} is read as {_spell_unit(unit)}")
     return value
 
 
 def speed_factor(unit: str) -> float | None:
     """Factor to m/s of a unit of speed in any spelling, or ``None`` for other units."""
-    name = _spelt(unit)
+    name = _spell_unit(unit)
     return _SPEED_UNITS[name] if name else None
 
 
-def _spelt(unit: str) -> str | None:
+def _spell_unit(unit: str) -> str | None:
     """The standard's spelling of a unit of speed."""
     return _UNIT_SPELLINGS.get(re.sub(r"[^a-z/]", "", unit.lower()))
 

@@ -170,14 +170,14 @@ def read_lane_figures(
         If the places of lanes cannot be read, or times do not fit what was measured.
     """
     records = _Records(run, meso=meso)
-    measured = _measured(records, end=end, times=times)
+    measured = _measure_lanes(records, end=end, times=times)
     if measured is None:
         return None
     places, clock, lanes, parts = measured
     return traffic_figures(lanes, places, end=end, times=times, clock=clock, parts=parts)
 
 
-def _measured(
+def _measure_lanes(
     records: _Records, *, end: float, times: AnalysisTimes
 ) -> tuple[LanePlaces, pl.DataFrame, pl.DataFrame, pl.DataFrame] | None:
     """Places of lanes, intervals, what lanes had in them, and parts of lanes."""
@@ -193,7 +193,7 @@ def _measured(
 def _measure_traffic(
     records: _Records, *, end: float, times: AnalysisTimes
 ) -> TrafficFigures | None:
-    measured, rows = _measured(records, end=end, times=times), records.rows
+    measured, rows = _measure_lanes(records, end=end, times=times), records.rows
     if measured is None:
         return None
     places, clock, lanes, parts = measured

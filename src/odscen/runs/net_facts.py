@@ -163,7 +163,7 @@ def _giving_way(net: NetConnections) -> dict[str, list[str]]:
     return found
 
 
-def _number(text: str | None) -> float | None:
+def _number_or_none(text: str | None) -> float | None:
     """A place or a time, if it is a number and not one of SUMO's words."""
     try:
         return None if text is None else float(text)
@@ -197,8 +197,8 @@ def _read_drivers(routes: Path) -> pl.DataFrame:
                     length,
                     heavy,
                     serves,
-                    _number(found.get("arrivalPos")),
-                    _number(found.get("depart")),
+                    _number_or_none(found.get("arrivalPos")),
+                    _number_or_none(found.get("depart")),
                     None if route is None else route.get("edges"),
                 )
             )

@@ -104,7 +104,7 @@ def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:
     files = trajectory_files(run)
     if not files:
         return None
-    with tables(_place(files)):
+    with tables(_name_of_records(files)):
         table = pl.scan_parquet(files)
         count = table.select(pl.len()).collect().item()
         if most is None or count <= most or _TIME not in table.collect_schema():
@@ -162,7 +162,7 @@ def read_conflicts(run: Path) -> pl.DataFrame | None:
     import polars as pl
 
     files = recorded_files(run, CONFLICTS_FILE)
-    with tables(_place(files)):
+    with tables(_name_of_records(files)):
         return conflicts_of_slices([pl.read_parquet(file) for file in files]) if files else None
 
 
@@ -223,10 +223,10 @@ def _read_recorded(run: Path, file: str) -> pl.DataFrame | None:
     import polars as pl
 
     files = recorded_files(run, file)
-    with tables(_place(files)):
+    with tables(_name_of_records(files)):
         return pl.read_parquet(files) if files else None
 
 
-def _place(files: Sequence[Path]) -> str:
+def _name_of_records(files: Sequence[Path]) -> str:
     """What a file is called that cannot be read: its path, or the folder of several."""
     return str(files[0] if len(files) == 1 else files[0].parent) if files else ""

@@ -112,7 +112,7 @@ def findings(
     entries = [
         *_find_lane_entries(odr, table, lanes),
         *_find_varying_widths(table, lanes),
-        *_access(odr),
+        *_find_access_entries(odr),
         *(
             ReportEntry(ElementOutcome.LOST, _describe_place(*lost.lane), lost.reason)
             for lost in found.lost
@@ -205,7 +205,7 @@ def _why_uncovered(odr: OpenDrive, table: RoadTable, row: int) -> str:
     return "nothing leads there"
 
 
-def _access(odr: OpenDrive) -> Iterator[ReportEntry]:
+def _find_access_entries(odr: OpenDrive) -> Iterator[ReportEntry]:
     """What became of ``<access>`` of lanes."""
     for road in odr.roads.values():
         for number, section in enumerate(road.sections):

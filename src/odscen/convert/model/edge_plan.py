@@ -285,7 +285,7 @@ class _Planner:
         rows = [
             int(r)
             for r in table.lanes_at(row, middle)
-            if self._classes(int(r), middle)
+            if self._classes_of_lane(int(r), middle)
             and float(table.lane_s1[r] - table.lane_s0[r]) >= LEAST_EDGE
             and self._widest_in_part(int(r), start, end) >= LEAST_WIDTH
         ]
@@ -306,7 +306,7 @@ class _Planner:
             states[forward].append(
                 _LaneState(
                     lane,
-                    self._classes(lane, middle),
+                    self._classes_of_lane(lane, middle),
                     round(speed(float(limits[index]), kind, road_type), 2),
                     up if forward else down,
                     down if forward else up,
@@ -318,7 +318,7 @@ class _Planner:
             right_first = (right_first[0][::-1], right_first[1][::-1])
         return _RoadPart(start, end, *right_first)
 
-    def _classes(self, row: int, s: float) -> frozenset[str]:
+    def _classes_of_lane(self, row: int, s: float) -> frozenset[str]:
         """Vehicle classes that may use a lane at s."""
         key = self._table.lane_keys[row]
         return vehicle_classes(self._odr.roads[key.road].sections[key.section].lanes[key.lane], s)

@@ -17,7 +17,7 @@ metres but for rounding; fewer are an estimate of the shares.
 Time lost is what vehicles spent there beyond the time that their metres take at the pace desired on
 this lane, which SUMO says for the whole of it; time standing is the share that the records have.
 Emissions are shared by the power that driving takes
-(:func:`_effort`). Where no positions were recorded, a part has its share of the lane by length, and
+(:func:`_driving_effort`). Where no positions were recorded, a part has its share of the lane by length, and
 :data:`SPREAD` says of how many seconds that holds.
 """
 
@@ -187,7 +187,9 @@ def part_sums(
         if batches > 1:
             kind = trajectories.collect_schema()["vehicle_id"]
             rows = rows.filter(among("vehicle_id", own["id"], kind))
-        sums = _sums_of(_records(rows, own, split, positions), split, period, float(moments[-1]))
+        sums = _sums_of(
+            _read_records(rows, own, split, positions), split, period, float(moments[-1])
+        )
         found = pl.concat([found, _by_interval(sums, split, clock)])
     keys = ("lane", "part", "begin")
     return found.group_by(keys).agg(pl.col(*_MEASURED, *_COUNTED).sum()).sort(keys)
@@ -235,7 +237,7 @@ class _Records:
     heavy: FloatArray
 
 
-def _records(
+def _read_records(
     trajectories: pl.LazyFrame,
     spans: pl.DataFrame,
     split: SplitLanes,
@@ -299,7 +301,7 @@ class _Moves:
     time: FloatArray
 
 
-def _moves(rows: _Records, split: SplitLanes, period: float, end: float) -> _Moves:
+def _find_moves(rows: _Records, split: SplitLanes, period: float, end: float) -> _Moves:
     """What was driven between records."""
     import numpy as np
 
@@ -363,7 +365,7 @@ class _PartRows:
 def _sums_of(rows: _Records, split: SplitLanes, period: float, end: float) -> _PartRows:
     import numpy as np
 
-    moves = _moves(rows, split, period, end)
+    moves = _find_moves(rows, split, period, end)
     last = split.first[1:] - 1
 
     def part_at(pos: FloatArray, lane: IntArray) -> IntArray:
@@ -385,7 +387,7 @@ def _sums_of(rows: _Records, split: SplitLanes, period: float, end: float) -> _P
     row = moves.row[each]
     before = np.zeros(len(rows.time))
     before[1:] = np.where(np.diff(rows.vehicle) == 0, np.diff(rows.speed) / period, 0.0)
-    effort = _effort(rows.speed, before, rows.heavy)
+    effort = _driving_effort(rows.speed, before, rows.heavy)
     came = np.flatnonzero(rows.came)
     nothing = np.zeros(len(came))
     measured = {
@@ -425,7 +427,7 @@ def _by_interval(sums: _PartRows, split: SplitLanes, clock: pl.DataFrame) -> pl.
     ).select(no_parts().columns)
 
 
-def _effort(speed: FloatArray, acceleration: FloatArray, heavy: FloatArray) -> FloatArray:
+def _driving_effort(speed: FloatArray, acceleration: FloatArray, heavy: FloatArray) -> FloatArray:
     """Power that driving takes, kW for each tonne, with what an engine needs when idle.
 
     Vehicle specific power (J. L. Jiménez-Palacios, *Understanding and Quantifying Motor Vehicle
@@ -468,7 +470,9 @@ def lane_parts(
     own = places.lanes.with_columns(part=pl.int_range(pl.len()).over("lane"))
     keys = ("lane", "part", "begin")
     rows = lanes.join(own, on="lane").join(
-        _shares(lanes, own, no_parts() if measured is None else measured), on=keys, how="left"
+        _shares_of_parts(lanes, own, no_parts() if measured is None else measured),
+        on=keys,
+        how="left",
     )
     known = col("of_seconds").is_not_null()
     by_length = col("share")
@@ -510,7 +514,9 @@ def lane_parts(
     )  # fmt: skip
 
 
-def _shares(lanes: pl.DataFrame, own: pl.DataFrame, measured: pl.DataFrame) -> pl.DataFrame:
+def _shares_of_parts(
+    lanes: pl.DataFrame, own: pl.DataFrame, measured: pl.DataFrame
+) -> pl.DataFrame:
     """Shares of the parts in what happened on the lane; lanes not recorded as a whole left out."""
     import polars as pl
 

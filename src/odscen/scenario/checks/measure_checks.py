@@ -285,7 +285,9 @@ def _overlapping_pairs(measures: Sequence[Measure], these: Iterable[int]) -> _Pa
     """Go through the begins of measures; each overlaps all that have not ended by then."""
     active: list[tuple[float, int]] = []
     number, listed = 0, list[tuple[int, int]]()
-    for begin, end, index in sorted((*_times(measures[index]), index) for index in these):
+    for begin, end, index in sorted(
+        (*_times_of_measure(measures[index]), index) for index in these
+    ):
         del active[: bisect_right(active, (begin, len(measures)))]
         number += len(active)
         listed += [
@@ -296,7 +298,7 @@ def _overlapping_pairs(measures: Sequence[Measure], these: Iterable[int]) -> _Pa
     return _Pairs(number, listed)
 
 
-def _times(measure: Measure) -> tuple[float, float]:
+def _times_of_measure(measure: Measure) -> tuple[float, float]:
     return measure.begin, math.inf if measure.end is None else measure.end
 
 
@@ -333,7 +335,7 @@ def _routes_when_closed(
     closed_by: dict[tuple[int, ...], BoolArray] = {}
     open_to: dict[tuple[tuple[int, ...], int | None], tuple[bytes, BoolArray]] = {}
     closures = [
-        (row, measure, banned_by(measure), *_times(measure))
+        (row, measure, banned_by(measure), *_times_of_measure(measure))
         for row, measure in enumerate(scenario.measures)
         if closed_places(measure)
     ]

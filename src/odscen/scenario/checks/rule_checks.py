@@ -244,7 +244,7 @@ class _RuleClashes:
             for kinds in (_SPEED, _PLACE)
         }
         for index, takes in self._takes.items():
-            later = [_above(index, of_kind[kinds]) for kinds in takes]
+            later = [_items_above(index, of_kind[kinds]) for kinds in takes]
             last = index
             for other in merge(*later):
                 if other != last and (index, other) not in self._waiting:
@@ -252,7 +252,7 @@ class _RuleClashes:
                 last = other
 
 
-def _above(least: int, ordered: Sequence[int]) -> Iterator[int]:
+def _items_above(least: int, ordered: Sequence[int]) -> Iterator[int]:
     return (ordered[at] for at in range(bisect_right(ordered, least), len(ordered)))
 
 

@@ -265,7 +265,7 @@ def put_parts(
         kept = {} if old is None else {field: getattr(old, field) for field in model.model_fields}
         if kind == "inputs" and {"per_hour", "volumes"} & fields.keys():
             kept |= {"per_hour": None, "volumes": ()}
-        with _at(f"demand.{kind}[{index}]", when=len(parts) > 1):
+        with _add_place_to_error(f"demand.{kind}[{index}]", when=len(parts) > 1):
             part = validated(model, {**kept, **fields, "id": name})
         if old is None:
             changed.append(part)
@@ -275,7 +275,7 @@ def put_parts(
 
 
 @contextmanager
-def _at(where: str, *, when: bool) -> Iterator[None]:
+def _add_place_to_error(where: str, *, when: bool) -> Iterator[None]:
     """Add its place to what is wrong with one of several parts."""
     try:
         yield

@@ -197,7 +197,7 @@ def _output_options(settings: SumocfgSettings) -> dict[str, str]:
         unended = {"stop-output.write-unfinished": "true"} if settings.parking else {}
         trips = {"stop-output": STOPINFO_FILE, **unended, **trips}
     if not recording.trajectories:
-        return {**(_positions() if settings.measures and not settings.meso else {}), **trips}
+        return {**(_position_options() if settings.measures and not settings.meso else {}), **trips}
     outputs = {
         "fcd-output": TRAJECTORIES_FILE,
         "fcd-output.attributes": ",".join(recording.attributes(elevation=settings.elevation)),
@@ -210,7 +210,7 @@ def _output_options(settings: SumocfgSettings) -> dict[str, str]:
     return {**outputs, **trips}
 
 
-def _positions() -> dict[str, str]:
+def _position_options() -> dict[str, str]:
     """Positions now and then, from which the parts of lanes have their shares."""
     return {
         "fcd-output": POSITIONS_FILE,
