@@ -16,9 +16,9 @@ metres but for rounding; fewer are an estimate of the shares.
 
 Time lost is what vehicles spent there beyond the time that their metres take at the pace desired on
 this lane, which SUMO says for the whole of it; time standing is the share that the records have.
-Emissions are shared by the power that driving takes
-(:func:`_driving_effort`). Where no positions were recorded, a part has its share of the lane by length, and
-:data:`SPREAD` says of how many seconds that holds.
+Emissions are shared by the power that driving takes (:func:`_driving_effort`). Where no positions
+were recorded, a part has its share of the lane by length, and :data:`SPREAD` says of how many
+seconds that holds.
 """
 
 from __future__ import annotations
