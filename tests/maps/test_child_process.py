@@ -150,6 +150,7 @@ def test_progress_is_told_again_while_nothing_changes(store: Workspace, motorway
 def test_a_child_that_waits_takes_the_next_map(store: Workspace) -> None:
     for child in children():  # one that other tests have left, and that may be full
         child.kill()
+        child.wait()
     store.add_map(SMALL)
     before = [one.pid for one in children()]
     with pytest.raises(OpenDriveError):
