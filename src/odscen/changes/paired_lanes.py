@@ -94,7 +94,7 @@ def _align_lanes(old: Sequence[Lane], new: Sequence[Lane]) -> list[LanePair]:
         choices: list[tuple[float, tuple[LanePair, ...]]] = []
         if i < len(old) and j < len(new):
             cost, rest = best(i + 1, j + 1)
-            choices.append((cost + _unlikeness(old[i], new[j]), ((old[i], new[j]), *rest)))
+            choices.append((cost + _count_differences(old[i], new[j]), ((old[i], new[j]), *rest)))
         if i < len(old):
             cost, rest = best(i + 1, j)
             choices.append((cost + _MISSING, ((old[i], None), *rest)))
@@ -106,7 +106,7 @@ def _align_lanes(old: Sequence[Lane], new: Sequence[Lane]) -> list[LanePair]:
     return list(best(0, 0)[1])
 
 
-def _unlikeness(old: Lane, new: Lane) -> float:
+def _count_differences(old: Lane, new: Lane) -> float:
     details = ("direction", "level", "heights", "speeds", "access", "road_marks")
     other = sum(getattr(old, name) != getattr(new, name) for name in details)
     return float(

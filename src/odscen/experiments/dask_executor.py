@@ -180,12 +180,12 @@ class DaskExecutor:
         """
         lost: float | None = None
         while True:
-            with self._connect(lost) as client:
+            with self._open_client(lost) as client:
                 if (yield from self._carried_out(client, orders)):
                     return
             lost = self._lost
 
-    def _connect(self, lost: float | None) -> Client:
+    def _open_client(self, lost: float | None) -> Client:
         """A client; a scheduler that was lost may take :data:`PATIENCE` to be back."""
         while True:
             try:

@@ -121,24 +121,24 @@ class MapEntry:
         """
         name = str(self.info["files"][key])
         with repair_advice(self.name):
-            return read_checked(self.folder, name, self._checksums())
+            return read_checked(self.folder, name, self._read_checksums())
 
     def checked(self, key: str) -> Path:
         """Path of one of its files, for others to read; errors as of :meth:`read`."""
         name = str(self.info["files"][key])
         with repair_advice(self.name):
-            if name in (sums := self._checksums()):
+            if name in (sums := self._read_checksums()):
                 refuse_damaged(self.folder, {name: sums[name]})
         return self.path(key)
 
     def damaged(self) -> list[DamagedFile]:
         """Its files that are not as they were written."""
         try:
-            return damaged_files(self.folder, self._checksums())
+            return damaged_files(self.folder, self._read_checksums())
         except DamagedError as error:
             return list(error.files)
 
-    def _checksums(self) -> dict[str, str]:
+    def _read_checksums(self) -> dict[str, str]:
         """Checksums of its files; of a map by an earlier version only those it knows itself."""
         sums = read_sums(self.folder)
         if sums is None:

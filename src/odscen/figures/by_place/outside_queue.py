@@ -145,6 +145,8 @@ def outside_sums(waits: pl.DataFrame, ways: pl.DataFrame, clock: pl.DataFrame) -
 
     Parameters
     ----------
+    waits
+        From :func:`outside_waits`.
     ways
         ``via`` and its ``lane_group``.
     clock
@@ -156,9 +158,10 @@ def outside_sums(waits: pl.DataFrame, ways: pl.DataFrame, clock: pl.DataFrame) -
     seconds = pl.min_horizontal("until", "end") - pl.max_horizontal("planned", "begin")
     return (
         waits.join(ways.select("lane_group", lane="via"), on="lane")
-        .join(clock, how="cross")
+        # Not all waits with all intervals: a day has a thousand of them.
+        .join_where(clock, col("begin") < col("until"), col("end") > col("planned"))
+        .sort("planned", "id", "begin")
         .with_columns(outside_seconds=seconds)
-        .filter(col("outside_seconds") > 0)
         .group_by("lane_group", "begin")
         .agg(col("outside_seconds").sum())
         .sort("lane_group", "begin")
