@@ -1877,13 +1877,14 @@ export interface components {
          * @description What can happen to an actor.
          *
          *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
-         *     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
-         *     and end; their id stands for that of an actor.
+         *     ``stranded``: a measure had closed every route to its goal, and it was taken out.
+         *     ``route_changed``: it did not get to the lane that its route needed, and took another one.
+         *     Measures begin and end; their id stands for that of an actor.
          *     What a rule does is reported of its actor, at the instant, which may lie inside a step;
          *     ``rule_acted`` is what no motion follows from, such as lights.
          * @enum {string}
          */
-        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
+        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "route_changed" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
         /** @description An expectation, what came of it, and whether it was met. */
         ExpectationInfo: {
             expectation: string;

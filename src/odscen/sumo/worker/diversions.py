@@ -46,6 +46,16 @@ class Diversions:
         self._cut_off: set[str] = set()
         self._begun = False
 
+    @property
+    def detours(self) -> Detours | None:
+        """Finds routes, if any measure closes something."""
+        return self._detours
+
+    @property
+    def closed_pairs(self) -> dict[str, Pairs]:
+        """By class of vehicles: edges between which they may not drive now."""
+        return dict(self._pairs)
+
     def before_step(self, session: Session, begin: float, length: float) -> list[Event]:
         """Act before the step from ``begin`` that lasts ``length`` (s); what happened."""
         index = bisect_left(self._moments, begin)
