@@ -3254,7 +3254,13 @@ export interface components {
             /** @default 1 */
             processes?: number;
         };
-        /** @description Segments, lanes or turns that no vehicle enters; who is on them drives out. */
+        /**
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         *
+         *     ``destinations`` says what becomes of trips to what is closed: the vehicle is taken out at once
+         *     (``leave``), the trip ends on the last open road before it (``end``), or the vehicle waits
+         *     there beside the road until the closure ends (``wait``).
+         */
         "RoadClosure-Input": {
             id: string;
             /** @default 0 */
@@ -3266,8 +3272,19 @@ export interface components {
              */
             kind: "closure";
             places: string[];
+            /**
+             * @default leave
+             * @enum {string}
+             */
+            destinations?: "leave" | "end" | "wait";
         };
-        /** @description Segments, lanes or turns that no vehicle enters; who is on them drives out. */
+        /**
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         *
+         *     ``destinations`` says what becomes of trips to what is closed: the vehicle is taken out at once
+         *     (``leave``), the trip ends on the last open road before it (``end``), or the vehicle waits
+         *     there beside the road until the closure ends (``wait``).
+         */
         "RoadClosure-Output": {
             id: string;
             /** @default 0 */
@@ -3279,6 +3296,11 @@ export interface components {
              */
             kind: "closure";
             places: string[];
+            /**
+             * @default leave
+             * @enum {string}
+             */
+            destinations: "leave" | "end" | "wait";
         };
         /**
          * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
