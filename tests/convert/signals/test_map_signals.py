@@ -178,7 +178,7 @@ def test_types_in_words_make_the_same_network_as_numbers(word: str, number: str)
 
 
 def test_what_is_no_known_light_or_leads_to_no_junction_is_lost_with_its_reason() -> None:
-    alone = road("7", inside=f"<signals>{signal(2, LIGHT, '+', 50.0)}</signals>", plan=(
+    alone = road("7", inside=f"<signals>{signal(2, '206', '+', 50.0)}</signals>", plan=(
         '<geometry s="0" x="0" y="200" hdg="0" length="100"><line/></geometry>'
     ))  # fmt: skip
     network = made(crossing({"1": signal(1, "vms")}, alone))

@@ -72,6 +72,9 @@ def _find_outermost_edge(edges: Sequence[EdgePlan], numbers: Sequence[int], *, a
 BOTH_WAYS = "bidirectional"
 """Lane type (up to 1.7) of lanes for both directions, mostly for turning left from the middle."""
 
+RAIL_TYPES = frozenset({"tram", "rail"})
+"""Lane types for vehicles that no scenario has."""
+
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
 
@@ -176,6 +179,10 @@ def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> It
             reason = f"lanes of type {kind} are open to no road user and left out"
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
+            elif kind in RAIL_TYPES:
+                reason = f"lanes of type {kind} are for rail vehicles, no road users: left out"
+            elif kind == "restricted":
+                reason = "lanes of type restricted, on which no access allows vehicles: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(key.road)}", reason)
 
 
@@ -278,6 +285,7 @@ def _find_signal_entries(
 ) -> Iterator[ReportEntry]:
     unplaced, guessed = dict(control.unplaced), dict(control.guessed)
     crossed = _lit_crossings(net)
+    walked = {name for light in net.lights for names in light.signals for name in names}
     for road in odr.roads.values():
         for signal in road.signals:
             element = f"road {shown_id(road.id)} > signal {shown_id(signal.id)}"
@@ -286,9 +294,15 @@ def _find_signal_entries(
                 yield ReportEntry(ElementOutcome.LOST, element, unplaced[element])
             elif element in guessed:
                 yield ReportEntry(ElementOutcome.GUESSED, element, guessed[element])
+            elif element in control.stops:
+                reason = "traffic light on a plain road: vehicles stop there, as before a junction"
+                yield ReportEntry(ElementOutcome.KEPT, element, reason)
             elif kind in ("traffic_light", "stop", "yield"):
                 word = kind.replace("_", " ")
                 yield ReportEntry(ElementOutcome.KEPT, element, f"{word}, as right of way in SUMO")
+            elif kind == "pedestrian_light" and signal.id in walked:
+                reason = "pedestrian light at a crosswalk: vehicles have one there in SUMO, too"
+                yield ReportEntry(ElementOutcome.GUESSED, element, reason)
             elif kind == "pedestrian_light":
                 yield _walk_light(element, table.road_index[road.id], signal, table, crossed)
             elif signal.dynamic:

@@ -14,6 +14,7 @@ import numpy as np
 
 from odscen.base.shown import shown_id
 from odscen.convert.model.right_of_way import Sign, wrapped
+from odscen.convert.signals.road_lights import REACH, RoadLights
 from odscen.opendrive.objects import signal_kind
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.connections import PlannedConnection
     from odscen.convert.model.edge_plan import EdgePlan
     from odscen.convert.model.lane_alignment import LaneAlignment
+    from odscen.convert.signals.road_lights import RoadStop, StandingLight
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive, Signal, SignalReference, Validity
 
@@ -232,9 +234,6 @@ def _facing_away(
     return frozenset(place for place, look in looks.items() if look <= 0)
 
 
-REACH = 80.0
-"""Metres ahead of a signal on a road within which the junction that it controls must come."""
-
 BEHIND = 5.0
 """Metres past the end of an edge where its signals may be, as beyond a stop line."""
 
@@ -248,13 +247,16 @@ class SignalControl(NamedTuple):
     """What controls each connection: ids of traffic lights, and the strongest sign.
 
     ``unplaced`` are signals that control nothing, with the reason; ``guessed`` are those that do
-    not control what the file says, but what it must mean.
+    not control what the file says, but what it must mean. ``standing`` are the lights that need
+    a place of their own, ``stops`` the elements of those that have one.
     """
 
     lights: tuple[tuple[str, ...], ...]
     signs: tuple[Sign, ...]
     unplaced: tuple[tuple[str, str], ...]
     guessed: tuple[tuple[str, str], ...]
+    standing: tuple[StandingLight, ...] = ()
+    stops: frozenset[str] = frozenset()
 
 
 def acting(odr: OpenDrive) -> Iterator[Acting]:
@@ -283,6 +285,7 @@ def signal_control(
     edges: Sequence[EdgePlan],
     connections: Sequence[PlannedConnection],
     is_junction: Callable[[int], bool],
+    stops: Mapping[Acting, RoadStop] | None = None,
 ) -> SignalControl:
     """Relate signals and signs to connections.
 
@@ -293,10 +296,14 @@ def signal_control(
     is_junction
         Whether an edge (its position) ends at a place where traffic meets, and not only where the
         lanes of one road change.
+    stops
+        Places that roads have been cut for, by the lights that need them.
     """
     reach = _SignalReach(odr, table, edges, connections, is_junction)
     homes = signal_homes(odr, [reach.junctions(number) for number in range(len(connections))])
     settled = settle_signals(list(acting(odr)), reach, homes)
+    on_roads = RoadLights(odr, table, edges, connections, is_junction, reach)
+    settled, standing = on_roads.settle(settled, stops or {})
     lights: list[dict[str, None]] = [{} for _ in connections]
     signs = [Sign.NONE for _ in connections]
     for place, numbers, _ in settled:
@@ -313,7 +320,12 @@ def signal_control(
     ]
     guessed = {signal.place.element: signal.guess for signal in settled if signal.guess}
     return SignalControl(
-        tuple(tuple(own) for own in lights), tuple(signs), tuple(unplaced), tuple(guessed.items())
+        tuple(tuple(own) for own in lights),
+        tuple(signs),
+        tuple(unplaced),
+        tuple(guessed.items()),
+        tuple(standing),
+        frozenset(place.element for place in stops or {}) & placed,
     )
 
 
