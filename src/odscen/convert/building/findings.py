@@ -20,7 +20,7 @@ from odscen.opendrive.sign_catalogue import country_of, sign_meaning
 from odscen.opendrive.topology import dead_ends, one_sided_links
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Container, Iterator, Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
     from odscen.convert.lane_table.table import LaneTable
@@ -284,6 +284,7 @@ def _find_signal_entries(
     odr: OpenDrive, table: RoadTable, net: Net, control: SignalControl
 ) -> Iterator[ReportEntry]:
     unplaced, guessed = dict(control.unplaced), dict(control.guessed)
+    favoured = dict(control.favoured)
     crossed = _lit_crossings(net)
     walked = {name for light in net.lights for names in light.signals for name in names}
     for road in odr.roads.values():
@@ -294,6 +295,9 @@ def _find_signal_entries(
                 yield ReportEntry(ElementOutcome.LOST, element, unplaced[element])
             elif element in guessed:
                 yield ReportEntry(ElementOutcome.GUESSED, element, guessed[element])
+            elif element in favoured:
+                reason = "priority sign, as right of way in SUMO: the other approaches give way"
+                yield ReportEntry(ElementOutcome.KEPT, element, reason)
             elif element in control.stops:
                 reason = "traffic light on a plain road: vehicles stop there, as before a junction"
                 yield ReportEntry(ElementOutcome.KEPT, element, reason)
@@ -310,7 +314,7 @@ def _find_signal_entries(
                     f"dynamic signal of type {signal.type or 'none'!r}, which is no known light"
                 )
                 yield ReportEntry(ElementOutcome.LOST, element, reason)
-    yield from _count_idle_signs(odr)
+    yield from _count_idle_signs(odr, favoured)
     yield from _bare_controllers(odr, net)
     if net.lights:
         reason = (
@@ -332,12 +336,14 @@ _IDLE_SIGNS = {
 """What holds instead of signs that are understood, and have no effect of their own."""
 
 
-def _count_idle_signs(odr: OpenDrive) -> Iterator[ReportEntry]:
-    """Count the signs that have no effect in SUMO, by country and type."""
+def _count_idle_signs(odr: OpenDrive, acting: Container[str]) -> Iterator[ReportEntry]:
+    """Count the signs that have no effect in SUMO, by country and type; ``acting`` are others."""
     counts: Counter[tuple[str, str]] = Counter()
     for road in odr.roads.values():
         for signal in road.signals:
             kind = signal_kind(signal)
+            if f"road {shown_id(road.id)} > signal {shown_id(signal.id)}" in acting:
+                continue
             if kind not in ("other", "speed_limit") or (signal.dynamic and kind == "other"):
                 continue
             meaning = "speed_limit" if kind == "speed_limit" else sign_meaning(signal) or ""

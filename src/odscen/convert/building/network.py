@@ -38,7 +38,7 @@ from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
 from odscen.convert.model.net_ids import lane_id
 from odscen.convert.model.net_xml import net_xml
-from odscen.convert.model.right_of_way import Movement, wrapped
+from odscen.convert.model.right_of_way import OPPOSING, Movement, Sign, wrapped
 from odscen.convert.pedestrian.crosswalks import place_crosswalks
 from odscen.convert.pedestrian.pedestrian_network import build_walks
 from odscen.convert.signals.map_signals import signal_control
@@ -594,9 +594,53 @@ class _NetworkBuilder:
             node = self._nodes.ends[edge]
             return node in self._nodes.xodr or node in crossed
 
-        return signal_control(
+        control = signal_control(
             self._odr, self._table, self._edges, self._connections, is_junction, self._stops
         )
+        return self._obey_priority_signs(control)
+
+    def _obey_priority_signs(self, control: SignalControl) -> SignalControl:
+        """Let those give way who come to a junction where others alone have a sign: of priority.
+
+        Where a sign to give way, a light or ``<priority>`` says who waits, that holds. A sign on
+        one approach is for the one straight opposite as well: writers leave that out.
+        """
+        signs, acting = list(control.signs), []
+        approaches: dict[str, set[int]] = {}
+        for _, numbers in control.favoured:
+            for number in numbers:
+                source = self._connections[number].source
+                approaches.setdefault(self._nodes.ends[source], set()).add(source)
+        for node, favoured in approaches.items():
+            numbers = self._by_node[node]
+            junctions = [self._odr.junctions[name] for name in self._nodes.xodr.get(node, ())]
+            settled = any(control.signs[n] or control.lights[n] for n in numbers)
+            if settled or not junctions or any(junction.priorities for junction in junctions):
+                continue
+            first = favoured
+            if len(favoured) == 1:
+                first = favoured | self._find_opposite_edges(*favoured, numbers)
+            waiting = [n for n in numbers if self._connections[n].source not in first]
+            for number in waiting:
+                signs[number] = Sign.YIELD
+            if waiting:
+                acting.append(node)
+        kept = tuple(
+            (element, numbers)
+            for element, numbers in control.favoured
+            if any(self._nodes.ends[self._connections[n].source] in acting for n in numbers)
+        )
+        return control._replace(signs=tuple(signs), favoured=kept)
+
+    def _find_opposite_edges(self, edge: int, numbers: Sequence[int]) -> set[int]:
+        """Edges that come to a junction straight towards another one."""
+        own = self._lane_lines[edge][0].headings()[1]
+        others = {self._connections[n].source for n in numbers} - {edge}
+        return {
+            other
+            for other in others
+            if abs(wrapped(self._lane_lines[other][0].headings()[1] - own)) > OPPOSING
+        }
 
     # Persons
 

@@ -16,6 +16,7 @@ from odscen.base.shown import shown_id
 from odscen.convert.model.right_of_way import Sign, wrapped
 from odscen.convert.signals.road_lights import REACH, RoadLights
 from odscen.opendrive.objects import signal_kind
+from odscen.opendrive.sign_catalogue import sign_meaning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -248,7 +249,8 @@ class SignalControl(NamedTuple):
 
     ``unplaced`` are signals that control nothing, with the reason; ``guessed`` are those that do
     not control what the file says, but what it must mean. ``standing`` are the lights that need
-    a place of their own, ``stops`` the elements of those that have one.
+    a place of their own, ``stops`` the elements of those that have one. ``favoured`` are
+    the connections of priority signs, by the elements of these.
     """
 
     lights: tuple[tuple[str, ...], ...]
@@ -257,6 +259,7 @@ class SignalControl(NamedTuple):
     guessed: tuple[tuple[str, str], ...]
     standing: tuple[StandingLight, ...] = ()
     stops: frozenset[str] = frozenset()
+    favoured: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
 
 def acting(odr: OpenDrive) -> Iterator[Acting]:
@@ -277,6 +280,16 @@ def acting(odr: OpenDrive) -> Iterator[Acting]:
                 )
             if kind == "traffic_light" or kind in SIGN_KINDS:
                 yield Acting(one.id, element, kind, road.id, one.s, one.orientation, one.validities)
+
+
+def _priority_places(odr: OpenDrive) -> Iterator[Acting]:
+    """Places of the signs that give priority at the next junction."""
+    for road in odr.roads.values():
+        for one in road.signals:
+            if sign_meaning(one) == "priority":
+                element = f"road {shown_id(road.id)} > signal {shown_id(one.id)}"
+                facing = one.orientation, one.validities
+                yield Acting(one.id, element, "priority", road.id, one.s, *facing)
 
 
 def signal_control(
@@ -326,6 +339,7 @@ def signal_control(
         tuple(guessed.items()),
         tuple(standing),
         frozenset(place.element for place in stops or {}) & placed,
+        tuple((place.element, tuple(reach.controls(place))) for place in _priority_places(odr)),
     )
 
 
