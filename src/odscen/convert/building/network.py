@@ -607,8 +607,8 @@ class _NetworkBuilder:
         """
         signs, acting = list(control.signs), []
         approaches: dict[str, set[int]] = {}
-        for _, numbers in control.favoured:
-            for number in numbers:
+        for _, controlled in control.favoured:
+            for number in controlled:
                 source = self._connections[number].source
                 approaches.setdefault(self._nodes.ends[source], set()).add(source)
         for node, favoured in approaches.items():
@@ -619,7 +619,7 @@ class _NetworkBuilder:
                 continue
             first = favoured
             if len(favoured) == 1:
-                first = favoured | self._find_opposite_edges(*favoured, numbers)
+                first = favoured | self._find_opposite_edges(next(iter(favoured)), numbers)
             waiting = [n for n in numbers if self._connections[n].source not in first]
             for number in waiting:
                 signs[number] = Sign.YIELD
