@@ -2489,6 +2489,12 @@ export interface components {
                 guessed?: number;
                 lost?: number;
             };
+            lost: {
+                [key: string]: number;
+            };
+            guessed: {
+                [key: string]: number;
+            };
             preview: string;
             outdated: boolean;
             semantics: components["schemas"]["SemanticsInfo"];
@@ -2502,6 +2508,7 @@ export interface components {
         /**
          * @description A map of the catalogue; ``report_counts`` says how many elements had which outcome.
          *
+         *     ``lost`` and ``guessed`` count what matters for traffic.
          *     ``importer`` has read its file ``source``: ``opendrive``, or that of another format.
          *
          *     An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
@@ -2521,6 +2528,12 @@ export interface components {
                 repaired?: number;
                 guessed?: number;
                 lost?: number;
+            };
+            lost: {
+                [key: string]: number;
+            };
+            guessed: {
+                [key: string]: number;
             };
             preview: string;
             outdated: boolean;
