@@ -37,7 +37,7 @@ def motion_report(workspace: Workspace, run: Path) -> dict[str, Any]:
     -------
     ``run``; how many findings are ``implausible``, of ``hard_braking``, and ``forced``; ``counts``
     by kind, category and cause; ``findings``, each with its unit and whether it is ``counted`` as
-    implausible. As :meth:`odscen.Run.motion`.
+    implausible. As :meth:`odscen.runs.finished_run.Run.motion`.
 
     Raises
     ------
