@@ -141,6 +141,8 @@ WALKED = 3.0
 """m/s that a pedestrian may be faster than recorded before that is a jump."""
 SPEED_ERROR = 0.1
 """m/s between the recorded speed and that of positions."""
+LANE_JOINT = 0.06
+"""Metres that positions slip where lanes meet: what SUMO's shortest lane is long, and rounding."""
 LATERAL_OFFSET = 0.5
 """Metres that a vehicle may be beside the centre of its lane, along which SUMO's speed is: in a
 curve the positions are slower or faster by yaw rate times offset."""
@@ -361,8 +363,8 @@ def _check_steps(
     half = np.minimum(np.abs(turned), 2.0) / 2.0
     covered = chord * np.where(half > 1e-6, half / np.maximum(np.sin(half), 1e-9), 1.0) / dt
     error = np.maximum(np.maximum(chord / dt - high, low - covered), 0.0)
-    excusable = SPEED_ERROR + LATERAL_OFFSET * np.abs(turned) / dt
-    keep(MotionKind.RECORDED_SPEED, smooth & (error > excusable + 0.01), error, excusable)
+    excusable = SPEED_ERROR + (LATERAL_OFFSET * np.abs(turned) + LANE_JOINT) / dt
+    keep(MotionKind.RECORDED_SPEED, smooth & (error > excusable), error, excusable)
 
     gain = (speed[later] - speed[now]) / dt
     keep(MotionKind.ACCELERATION, gain > gain_bound + 0.05, gain, gain_bound)
