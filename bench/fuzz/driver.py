@@ -20,19 +20,28 @@ from pathlib import Path
 
 import odscen
 from bench.common import OUT
+from bench.fuzz.byte_targets import BYTE_TARGETS
+from bench.fuzz.edit_targets import edit_trial
 from bench.fuzz.fault_targets import FAULT_TARGETS
 from bench.fuzz.file_targets import FILE_TARGETS
 from bench.fuzz.folder_targets import FOLDER_TARGETS
+from bench.fuzz.handed_targets import HANDED_TARGETS
 from bench.fuzz.limits import Limits
 from bench.fuzz.material import Material, prepare
+from bench.fuzz.process_targets import PROCESS_TARGETS
 from bench.fuzz.request_targets import handmade_trial, schema_trial
 from bench.fuzz.served import Served
+from bench.fuzz.state_targets import STATE_TARGETS
 from bench.fuzz.trials import Trial, trial_rng
 from bench.fuzz.verdicts import Finding, Tried, Verdict
 
 MINUTES = 60.0
 KEPT = OUT / "fuzz"
-REQUESTS = {"requests by hand": (handmade_trial, 1.0), "requests by schema": (schema_trial, 1.0)}
+REQUESTS = {
+    "edits": (edit_trial, 3.0),
+    "requests by hand": (handmade_trial, 1.5),
+    "requests by schema": (schema_trial, 1.5),
+}
 _SKIPPED_IMPORTS = ("odscen.__main__", "odscen.carla", "odscen.sumo.worker.simulation.session")
 """What a command imports only in a process of its own."""
 
@@ -50,6 +59,10 @@ class Bench:
             **FILE_TARGETS,
             **FOLDER_TARGETS,
             **FAULT_TARGETS,
+            **HANDED_TARGETS,
+            **STATE_TARGETS,
+            **PROCESS_TARGETS,
+            **BYTE_TARGETS,
         }
         for name, (target, share) in REQUESTS.items():
             targets[name] = (self._with_server(target), share)
@@ -81,7 +94,9 @@ class Bench:
             kind = "not made"
             words = traceback.format_exc().strip().splitlines()[-1]
             trial.findings.append(Finding(Verdict.WRONG, f"the bench itself: {words}"))
-        tried = Tried(target, seed, kind, trial.finding, time.perf_counter() - begin, trial.peak)
+        took = time.perf_counter() - begin
+        counts = dict(trial.counts)
+        tried = Tried(target, seed, kind, trial.finding, took, trial.peak, counts)
         self.limits.clean(0.0)
         if tried.finding.verdict.failed:
             keep(folder, tried)
@@ -205,6 +220,10 @@ def table(tried: Sequence[Tried], seconds: float) -> str:
             or "nothing failed"
         )
     )
+    counted: Counter[str] = Counter()
+    for one in tried:
+        counted.update(one.counts)
+    lines += [f"{what}: {number:,}" for what, number in sorted(counted.items())]
     skipped = {one.finding.words for one in tried if one.finding.verdict is Verdict.SKIPPED}
     lines += [f"skipped: {words}" for words in sorted(skipped)]
     if verdicts:

@@ -311,7 +311,7 @@ def _no_handles(trial: Trial) -> str:
 
 
 FAULT_TARGETS: dict[str, tuple[Callable[[Trial], str], float]] = {
-    "disks": (disks, 0.8),
-    "kills": (kills, 1.5),
-    "starts": (starts, 0.7),
+    "disks": (disks, 0.6),
+    "kills": (kills, 0.5),
+    "starts": (starts, 0.4),
 }
