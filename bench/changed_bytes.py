@@ -11,7 +11,6 @@ each file. ``--most`` changes so many at random instead.
 from __future__ import annotations
 
 import argparse
-import os
 import random
 import shutil
 import tempfile
@@ -280,21 +279,27 @@ def _reads(kind: str, reader: str, name: str) -> bool:
 
 
 @contextmanager
-def changed_byte(file: Path, place: int, bit: int, kept: Path) -> Iterator[None]:
-    """Change one byte of a file, and put it back with all of its folder, of which a copy is kept.
+def changed_byte(folder: Path, name: str, place: int, bit: int, kept: Path) -> Iterator[None]:
+    """Change one byte of a file, and put back all of its folder, of which a copy is kept.
 
-    What resumes a run removes a slice that is damaged.
+    What resumes a run removes slices that are damaged, and those after them.
     """
-    content, stat = file.read_bytes(), file.stat()
-    changed = bytearray(content)
+    file = folder / name
+    changed = bytearray(file.read_bytes())
     changed[place] ^= bit
     file.unlink()  # the network of a run is a link to the map's
     file.write_bytes(changed)
     try:
         yield
     finally:
-        shutil.copytree(kept.parent, file.parent, dirs_exist_ok=True)
-        os.utime(file, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+        shutil.copy2(kept / name, file)
+        for path in kept.rglob("*"):
+            there = folder / path.relative_to(kept)
+            if not there.exists():
+                if path.is_dir():
+                    shutil.copytree(path, there)
+                else:
+                    shutil.copy2(path, there)
 
 
 def places_of(size: int) -> list[int]:
@@ -327,7 +332,7 @@ def unnoticed(
     kept = folder.beside / "kept"
     shutil.copytree(folder.path, kept)
     for name, place, chosen in due:
-        with changed_byte(folder.path / name, place, 1 << chance.randrange(8), kept / name):
+        with changed_byte(folder.path, name, place, 1 << chance.randrange(8), kept):
             for reader in chosen:
                 if not _reads(folder.kind, reader, name):
                     continue

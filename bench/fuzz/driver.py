@@ -9,17 +9,19 @@ import json
 import os
 import pkgutil
 import shutil
+import signal
 import sys
 import tempfile
 import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import odscen
 from bench.common import OUT
+from bench.fuzz.batches import BATCH, BATCHED, try_batch
 from bench.fuzz.byte_targets import BYTE_TARGETS
 from bench.fuzz.edit_targets import edit_trial
 from bench.fuzz.fault_targets import FAULT_TARGETS
@@ -36,6 +38,9 @@ from bench.fuzz.trials import Trial, trial_rng
 from bench.fuzz.verdicts import Finding, Tried, Verdict
 
 MINUTES = 60.0
+ALONE = 3
+"""One turn of so many of a target that has batches is a trial alone."""
+PROGRESS = 300.0
 KEPT = OUT / "fuzz"
 REQUESTS = {
     "edits": (edit_trial, 3.0),
@@ -108,6 +113,23 @@ class Bench:
         self.served.stop()
         shutil.rmtree(self.root, ignore_errors=True)
 
+    def attempt_batch(self, target: str, seeds: Sequence[int]) -> list[Tried]:
+        """Make trials in one process; what fails is tried again alone."""
+        folder = self.root / "trial"
+        folder.mkdir()
+        alone = Trial(self.material, self.limits, folder, seeds[0], trial_rng(target, seeds[0]))
+        tried = try_batch(alone, target, self.targets[target][0], seeds)
+        self.limits.clean(0.0)
+        shutil.rmtree(folder, ignore_errors=True)
+        found = []
+        for one in tried:
+            again = self.attempt(target, one.seed) if one.finding.verdict.failed else one
+            if one.finding.verdict.failed and not again.finding.verdict.failed:
+                words = f"in a batch only: {one.finding.words}"
+                again = replace(one, finding=Finding(one.finding.verdict, words))
+            found.append(again)
+        return found
+
 
 def keep(folder: Path, tried: Tried) -> None:
     """Keep the folder of a trial with what is to be known of it."""
@@ -137,6 +159,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     options = _options(sys.argv[1:] if argv is None else argv)
     root = Path(tempfile.mkdtemp(prefix="odscen-fuzz-"))
     bench = Bench(root)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends with what it has started
     try:
         bench.prepare()
         begin = time.perf_counter()
@@ -181,19 +204,31 @@ def _many(
     spent = dict.fromkeys(chosen, 0.0)
     seeds = dict.fromkeys(chosen, options.first)
     tried: list[Tried] = []
+    turns: Counter[str] = Counter()
+    told = begin
     while time.perf_counter() - begin < options.minutes * 60.0:
         target = min(chosen, key=lambda name: (spent[name] / bench.targets[name][1], name))
         start = time.perf_counter()
-        one = bench.attempt(target, seeds[target])
+        turns[target] += 1
+        if target in BATCHED and turns[target] % ALONE:
+            mine = range(seeds[target], seeds[target] + BATCH)
+            found = bench.attempt_batch(target, mine)
+        else:
+            mine = range(seeds[target], seeds[target] + 1)
+            found = [bench.attempt(target, seeds[target])]
         spent[target] += time.perf_counter() - start
-        seeds[target] += 1
-        tried.append(one)
-        if one.finding.verdict.failed:
-            print(
-                f"{one.finding.verdict} --target {target!r} --seed {one.seed}: {one.kind}: "
-                f"{one.finding.words}".encode("utf-8", "backslashreplace").decode(),
-                flush=True,
-            )
+        seeds[target] = mine.stop
+        tried += found
+        for one in found:
+            if one.finding.verdict.failed:
+                print(
+                    f"{one.finding.verdict} --target {target!r} --seed {one.seed}: {one.kind}: "
+                    f"{one.finding.words}".encode("utf-8", "backslashreplace").decode(),
+                    flush=True,
+                )
+        if time.perf_counter() - told > PROGRESS:
+            told = time.perf_counter()
+            print(f"{(told - begin) / 60.0:.0f} minutes: {len(tried):,} trials", flush=True)
     return tried
 
 
@@ -214,7 +249,7 @@ def table(tried: Sequence[Tried], seconds: float) -> str:
     ]
     verdicts = Counter(one.finding.verdict for one in tried if one.finding.verdict.failed)
     lines.append(
-        f"{seconds / 60.0:.1f} minutes; "
+        f"{seconds / 60.0:.1f} minutes, {_processor_minutes():.1f} of one processor; "
         + (
             ", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items()))
             or "nothing failed"
@@ -229,6 +264,12 @@ def table(tried: Sequence[Tried], seconds: float) -> str:
     if verdicts:
         lines.append(f"folders of the failures: {os.path.relpath(KEPT)}")
     return "\n".join(lines)
+
+
+def _processor_minutes() -> float:
+    """What this process and those that it has waited for have computed."""
+    spent = os.times()
+    return (spent.user + spent.system + spent.children_user + spent.children_system) / 60.0
 
 
 def _row(name: str, own: Sequence[Tried]) -> tuple[str, ...]:

@@ -111,8 +111,8 @@ def _archive(tables: dict[str, bytes], rng: Generator, *, odd: bool) -> bytes:
         if kind == "outside":
             archive.writestr("../../../stops.txt", b"stop_id\nx\n")
         elif kind == "large":
-            archive.writestr("shapes.txt", b"0" * 300_000_000)
-            archive.writestr("more/stops.txt", b"a,b\n" * 50_000_000)
+            archive.writestr("shapes.txt", b"0" * 120_000_000)
+            archive.writestr("more/stops.txt", b"a,b\n" * 20_000_000)
         elif kind == "link":
             link = zipfile.ZipInfo("calendar_dates.txt")
             link.external_attr = 0o120777 << 16

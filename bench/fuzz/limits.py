@@ -209,7 +209,7 @@ def _child(
             before()
         if whole:
             os.execv(sys.executable, [sys.executable, "-m", "odscen", *argv])
-        code = _call(argv) if call is None else call()
+        code = call_command(argv) if call is None else call()
     except BaseException:
         traceback.print_exc()
     finally:
@@ -260,7 +260,8 @@ def _give_up_rights() -> None:
     libc.capset(header, sets)
 
 
-def _call(argv: tuple[str, ...]) -> int:
+def call_command(argv: tuple[str, ...]) -> int:
+    """Call a command in this process; its exit code."""
     from odscen.cli import main
 
     sys.argv = ["odscen", *argv]

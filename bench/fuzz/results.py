@@ -146,7 +146,12 @@ def wrong_in_imported_table(kind: str, table: Path, scenario: Path) -> str:
 
     demand = read_scenario(scenario).demand
     text = table.read_bytes().decode("utf-8-sig")
-    rows = [row for row in csv.DictReader(io.StringIO(text)) if any(row.values())]
+    head = text.partition("\n")[0]
+    separator = ";" if ";" in head else ","
+    if kind != "profile" and not {"trips", "count", "zone"} & set(head.split(separator)):
+        return ""  # written in another way, of which this knows nothing
+    lines = csv.DictReader(io.StringIO(text), delimiter=separator)
+    rows = [row for row in lines if any(row.values())]
     if kind == "od":
         given = sum(float(row["trips"].replace(",", ".")) for row in rows)
         read = sum(trips for matrix in demand.matrices for _, _, trips in matrix.trips)

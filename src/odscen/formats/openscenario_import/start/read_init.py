@@ -6,11 +6,14 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
+from odscen.base.errors import ScenarioError
 from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.places.map_points import MapPoint
 from odscen.formats.openscenario_import.start.actor_places import ActorPlaces
 from odscen.formats.openscenario_import.start.read_appearances import AppearanceReader
 from odscen.formats.openscenario_import.story.global_actions import tell_unread
+from odscen.scenario.document.problems import validated
+from odscen.scenario.document.scenario_document import Actor
 from odscen.scenario.templates.scene_template import STEADY
 
 if TYPE_CHECKING:
@@ -24,6 +27,10 @@ if TYPE_CHECKING:
 _SAME_PLACE: Final = 0.05
 _SAME_SPEED: Final = 1e-4
 """Metres and m/s within which a file says what the properties of an actor do."""
+
+
+def _is_formula(value: object) -> bool:
+    return isinstance(value, str) and "$" in value
 
 
 class InitReader:
@@ -172,6 +179,12 @@ class InitReader:
     ) -> dict[str, Any]:
         """Actor that odscen wrote; place, speed and goal of the file hold where they differ."""
         made = {"id": entity.id, "category": str(entity.category), **fields}
+        # Formulas become numbers when the whole document is read.
+        plain = {name: value for name, value in made.items() if not _is_formula(value)}
+        try:
+            validated(Actor, plain)
+        except ScenarioError as error:
+            raise RefusedError(entity.element, f"its properties: {error.problem}") from error
         nodes, then = self._positions, self._then.get(entity.id, [])
         there = nodes.of_node(made["spawn"])
         by_rule = entity.id in self._appear.late - self._appear.departing
