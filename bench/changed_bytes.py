@@ -292,7 +292,7 @@ def changed_byte(folder: Path, name: str, place: int, bit: int, kept: Path) -> I
     try:
         yield
     finally:
-        shutil.copy2(kept / name, file)
+        file.unlink(missing_ok=True)
         for path in kept.rglob("*"):
             there = folder / path.relative_to(kept)
             if not there.exists():

@@ -22,7 +22,7 @@ from bench.fuzz.limits import SECONDS, TRACEBACK, Ended, busy, call_command, hig
 from bench.fuzz.trials import Trial, trial_rng
 from bench.fuzz.verdicts import Finding, Tried, Verdict, judge, left_over, listing
 
-BATCH = 16
+BATCH = 24
 LONGEST = 90.0
 """Seconds for a batch, on a machine with nothing else to do."""
 _ALONE = ("run", "resume", "dataset", "test", "serve")

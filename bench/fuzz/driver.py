@@ -38,7 +38,7 @@ from bench.fuzz.trials import Trial, trial_rng
 from bench.fuzz.verdicts import Finding, Tried, Verdict
 
 MINUTES = 60.0
-ALONE = 3
+ALONE = 6
 """One turn of so many of a target that has batches is a trial alone."""
 PROGRESS = 300.0
 KEPT = OUT / "fuzz"

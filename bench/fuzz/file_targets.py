@@ -242,10 +242,10 @@ FILE_TARGETS: dict[str, tuple[Target, float]] = {
     "config": (configs, 1.0),
     "graph form": (graph_forms, 0.6),
     "lights": (lights, 0.8),
-    "map": (maps, 2.5),
-    "network": (networks, 0.5),
-    "odd file": (map_files, 0.3),
-    "scenario": (scenarios, 2.0),
-    "tables": (tables, 1.2),
+    "map": (maps, 2.0),
+    "network": (networks, 0.4),
+    "odd file": (map_files, 0.2),
+    "scenario": (scenarios, 2.5),
+    "tables": (tables, 1.5),
 }
 """Trials by name, each with its share of the time."""

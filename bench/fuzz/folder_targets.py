@@ -225,8 +225,8 @@ def options(trial: Trial) -> str:
 
 FOLDER_TARGETS: dict[str, tuple[Target, float]] = {
     "assets": (assets, 0.5),
-    "interrupted run": (interrupted, 0.5),
-    "map folder": (map_folders, 0.6),
+    "interrupted run": (interrupted, 0.4),
+    "map folder": (map_folders, 0.4),
     "options": (options, 0.7),
     "run folder": (run_folders, 1.2),
     "suite": (suites, 0.6),

@@ -287,10 +287,10 @@ _EDITS = [
 ]
 
 HANDED_TARGETS: dict[str, tuple[Target, float]] = {
-    "edits of files": (edits_of_files, 1.5),
+    "edits of files": (edits_of_files, 2.5),
     "feed": (feeds, 1.0),
-    "openscenario": (openscenario, 1.5),
-    "study plan": (study_plans, 1.2),
-    "sweep plan": (sweep_plans, 1.2),
+    "openscenario": (openscenario, 1.2),
+    "study plan": (study_plans, 2.0),
+    "sweep plan": (sweep_plans, 2.0),
 }
 """As :data:`bench.fuzz.file_targets.FILE_TARGETS`."""

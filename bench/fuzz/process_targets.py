@@ -297,9 +297,9 @@ def _long_folder(folder: Path) -> Path:
 
 
 PROCESS_TARGETS: dict[str, tuple[Target, float]] = {
-    "limits": (limits, 0.4),
-    "odd names": (odd_names, 0.5),
-    "shared temporary": (shared_temporary, 0.3),
-    "streams": (streams, 0.4),
+    "limits": (limits, 0.3),
+    "odd names": (odd_names, 0.4),
+    "shared temporary": (shared_temporary, 0.2),
+    "streams": (streams, 0.3),
 }
 """As :data:`bench.fuzz.file_targets.FILE_TARGETS`."""

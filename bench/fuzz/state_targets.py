@@ -324,7 +324,7 @@ _MAPS: dict[str, Callable[[str, Generator], str]] = {
 }
 
 STATE_TARGETS: dict[str, tuple[Target, float]] = {
-    "odd map": (odd_maps, 1.0),
-    "odd state": (odd_states, 2.0),
+    "odd map": (odd_maps, 0.6),
+    "odd state": (odd_states, 1.5),
 }
 """As :data:`bench.fuzz.file_targets.FILE_TARGETS`."""
