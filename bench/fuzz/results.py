@@ -160,7 +160,7 @@ def wrong_in_imported_table(kind: str, table: Path, scenario: Path) -> str:
         read = sum(row[3] for counts in demand.counts for row in counts.rows)
     elif kind == "zones":
         given = len({(row["zone"].strip(), row["segment"].strip()) for row in rows})
-        read = sum(len(zone.segments) for zone in demand.zones)
+        read = sum(len(set(zone.segments)) for zone in demand.zones)
     else:
         given = len(rows)
         read = max((len(profile.shares) for profile in demand.profiles), default=0)
