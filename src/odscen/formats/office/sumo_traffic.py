@@ -81,7 +81,13 @@ class _Reader:
         self._rows = 0
 
     def file(self, root: etree._Element) -> TrafficFile:
-        """All that was read, as one file."""
+        """All that was read, as one file.
+
+        Raises
+        ------
+        InputError
+            If that is nothing.
+        """
         kinds = []
         slices = f"{len(self._intervals)} interval{'s' if len(self._intervals) != 1 else ''}"
         if self._trips:
