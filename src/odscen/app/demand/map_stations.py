@@ -72,7 +72,7 @@ class StationFinder:
         segments = place_segments(bare)
         if all(segment in self._rows for segment in segments):
             return MapPlace(bare, -1)
-        if name in self._nodes_of_edge:
+        if name in self._loaded.sumo.edge_nodes:
             return self.of_edge(name)
         if name in self._loaded.sumo.net.lanes:
             return self.of_lane(name)
@@ -93,7 +93,7 @@ class StationFinder:
 
     def of_edge(self, edge: str, pos: float | None = None) -> MapPlace:
         """Find a SUMO edge, at its end or at metres along it."""
-        nodes = self._nodes_of_edge.get(edge)
+        nodes = self._loaded.sumo.edge_nodes.get(edge)
         if nodes is None:
             known = edge in self._loaded.sumo.net.edge_lanes
             raise InputError(
@@ -128,8 +128,8 @@ class StationFinder:
         InputError
             If an edge is not on the map, or no lane leads from one to the other.
         """
-        start = self._nodes_of_edge.get(origin)
-        end = self._nodes_of_edge.get(destination)
+        start = self._loaded.sumo.edge_nodes.get(origin)
+        end = self._loaded.sumo.edge_nodes.get(destination)
         for edge, nodes in ((origin, start), (destination, end)):
             if nodes is None:
                 raise InputError(f"the map has nothing under SUMO edge {shown(edge)}")
@@ -152,7 +152,7 @@ class StationFinder:
         """Segments of the roads that SUMO edges lie on."""
         found: dict[str, None] = {}
         for edge in edges:
-            nodes = self._nodes_of_edge.get(edge)
+            nodes = self._loaded.sumo.edge_nodes.get(edge)
             for row in () if nodes is None else self._lanes.segment[nodes].tolist():
                 found[str(self._graph.segments.ids[row])] = None
         return tuple(found)
@@ -178,21 +178,6 @@ class StationFinder:
     @cached_property
     def _lanes_of_nodes(self) -> Int32Array:
         return self._loaded.sumo.lane_places.lane
-
-    @cached_property
-    def _nodes_of_edge(self) -> dict[str, Int32Array]:
-        """Nodes of the lane graph on the lanes of each SUMO edge, junctions left out."""
-        places, net = self._loaded.sumo.lane_places, self._loaded.sumo.net
-        order = np.argsort(places.lane, kind="stable")
-        rows, starts = np.unique(places.lane[order], return_index=True)
-        groups: dict[str, list[Int32Array]] = {}
-        for row, nodes in zip(rows.tolist(), np.split(order, starts[1:]), strict=True):
-            if row < 0:
-                continue
-            lane = net.lanes[places.lanes[row]]
-            if not lane.internal:
-                groups.setdefault(lane.edge, []).append(nodes.astype(np.int32))
-        return {edge: np.sort(np.concatenate(parts)) for edge, parts in groups.items()}
 
     @cached_property
     def _roads_by_name(self) -> dict[str, tuple[str, ...]]:

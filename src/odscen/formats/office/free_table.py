@@ -254,6 +254,9 @@ class FreeTable:
         if square:
             return self._read_square(square)
         titles = [normalised(title) for title in self._table.titles]
+        zones = self._zone_columns(titles)
+        if zones is not None:
+            return self._read_zones(*zones)
         pairs = [
             any(re.fullmatch(_ROLES[role], title) for title in titles)
             for role in ("origin", "destination", "trips")
@@ -273,6 +276,30 @@ class FreeTable:
         return self._read_long()
 
     # ------------------------------------------------------------------ matrices
+
+    def _zone_columns(self, titles: Sequence[str]) -> tuple[int, int] | None:
+        """Columns of a zone and of its segments or edges, in a table of two columns."""
+        zone = r"zones?|bezirke?|taz|districts?|verkehrsbezirk|(zone|taz|bezirk)(id|nr|name)"
+        place = r"segments?|edges?|links?|kanten?|roads?|edgeid|segmentid"
+        first = next((n for n, title in enumerate(titles) if re.fullmatch(zone, title)), None)
+        second = next((n for n, title in enumerate(titles) if re.fullmatch(place, title)), None)
+        if first is None or second is None or len([title for title in titles if title]) > 2:
+            return None
+        return first, second
+
+    def _read_zones(self, zone: int, place: int) -> TrafficFile:
+        found: dict[str, list[str]] = {}
+        for row, line in zip(self._table.rows, self._table.lines, strict=True):
+            if row[zone] and row[place]:
+                found.setdefault(row[zone], []).extend(row[place].split())
+            else:
+                self._leave_out(line, "no zone or no place")
+        return TrafficFile(
+            what=f"a table of {len(found)} zones ({self._table.kind})",
+            rows=len(self._table.rows),
+            zones={name: tuple(dict.fromkeys(places)) for name, places in found.items()},
+            left_out=tuple(self._left),
+        )
 
     def _square_zones(self) -> list[str]:
         """Destinations of a square matrix; none if it is not one."""
