@@ -3681,6 +3681,7 @@ export interface components {
             rules: components["schemas"]["StoryRule-Output"][];
             /** @default [] */
             criteria: string[];
+            sumo: components["schemas"]["SumoProject"] | null;
             parameters: {
                 [key: string]: components["schemas"]["Parameter"];
             };
@@ -4735,6 +4736,35 @@ export interface components {
          * @enum {string}
          */
         SummaryPart: "" | "actors" | "figures";
+        /**
+         * @description A file of SUMO: ``packed`` is its text, compressed (zlib) and in base64.
+         *
+         *     ``elements`` says how many of each kind it has, for people.
+         */
+        SumoFile: {
+            name: string;
+            /** @enum {string} */
+            kind: "routes" | "additional";
+            packed: string;
+            elements: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * @description Files and options of a SUMO project.
+         *
+         *     ``begin`` is when its simulation begins, seconds; times of the run are those of SUMO, and
+         *     nothing happens before. ``options`` are SUMO's own, beside those that the simulation has.
+         */
+        SumoProject: {
+            /** @default 0 */
+            begin: number;
+            options: {
+                [key: string]: string;
+            };
+            /** @default [] */
+            files: components["schemas"]["SumoFile"][];
+        };
         /**
          * @description One case: values of the parameters and of the columns, in their order.
          *
