@@ -1877,13 +1877,14 @@ export interface components {
          * @description What can happen to an actor.
          *
          *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
-         *     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
-         *     and end; their id stands for that of an actor.
+         *     ``stranded``: a measure had closed every route to its goal, and it was taken out.
+         *     ``route_changed``: it did not get to the lane that its route needed, and took another one.
+         *     Measures begin and end; their id stands for that of an actor.
          *     What a rule does is reported of its actor, at the instant, which may lie inside a step;
          *     ``rule_acted`` is what no motion follows from, such as lights.
          * @enum {string}
          */
-        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
+        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "route_changed" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
         /** @description An expectation, what came of it, and whether it was met. */
         ExpectationInfo: {
             expectation: string;
@@ -3266,7 +3267,13 @@ export interface components {
             /** @default 1 */
             processes?: number;
         };
-        /** @description Segments, lanes or turns that no vehicle enters; who is on them drives out. */
+        /**
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         *
+         *     ``destinations`` says what becomes of trips to what is closed: the vehicle is taken out at once
+         *     (``leave``), the trip ends on the last open road before it (``end``), or the vehicle waits
+         *     there beside the road until the closure ends (``wait``).
+         */
         "RoadClosure-Input": {
             id: string;
             /** @default 0 */
@@ -3278,8 +3285,19 @@ export interface components {
              */
             kind: "closure";
             places: string[];
+            /**
+             * @default leave
+             * @enum {string}
+             */
+            destinations?: "leave" | "end" | "wait";
         };
-        /** @description Segments, lanes or turns that no vehicle enters; who is on them drives out. */
+        /**
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         *
+         *     ``destinations`` says what becomes of trips to what is closed: the vehicle is taken out at once
+         *     (``leave``), the trip ends on the last open road before it (``end``), or the vehicle waits
+         *     there beside the road until the closure ends (``wait``).
+         */
         "RoadClosure-Output": {
             id: string;
             /** @default 0 */
@@ -3291,6 +3309,11 @@ export interface components {
              */
             kind: "closure";
             places: string[];
+            /**
+             * @default leave
+             * @enum {string}
+             */
+            destinations: "leave" | "end" | "wait";
         };
         /**
          * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.

@@ -747,6 +747,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "more than {limit} bytes cannot be taken" }),
   msg({ message: "more than {most_files} files were sent" }),
   msg({ message: "most at {kept} ({reason})" }),
+  msg({ message: "motion cannot be checked: no trajectories were recorded, or more than 1 s apart" }),
   msg({ message: "motorcycle" }),
   msg({ message: "movement {kind}" }),
   msg({ message: "movement {kind} walk" }),

@@ -33,6 +33,14 @@ if TYPE_CHECKING:
 POSITIONS_EVERY = 5.0
 """Seconds between the positions of a run without trajectories, which are not kept."""
 
+LANE_CHANGE = 3.0
+"""Seconds that a change of lanes takes; Toledo and Zohar, "Modeling duration of lane changes",
+Transportation Research Record 1999, 2007, have 1 to 13 s with a mean of 4.6 s.
+
+Vehicles are on both lanes meanwhile. Slow ones take longer, see
+:data:`odscen.sumo.realize.driving.LATERAL_SHARE`. SUMO's sublane model moves by itself.
+"""
+
 SQUEEZE = 120.0
 """Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.
 
@@ -171,7 +179,11 @@ def sumo_config(settings: SumocfgSettings) -> str:
             "pedestrian.striping.jamtime": f"{SQUEEZE:g}",
             "time-to-teleport": f"{settings.time_to_teleport or -1.0:g}",
             **_optional_value("default.action-step-length", settings.action_step),
-            **_optional_value("lateral-resolution", settings.lateral_resolution),
+            **(
+                {"lanechange.duration": f"{LANE_CHANGE:g}"}
+                if settings.lateral_resolution is None
+                else {"lateral-resolution": f"{settings.lateral_resolution:g}"}
+            ),
         },
         "random_number": {"seed": str(settings.seed)},
         "report": {
@@ -199,7 +211,8 @@ def sumo_config(settings: SumocfgSettings) -> str:
         }
         # The striping model needs lanes with places on them, which meso does not keep.
         sections["processing"]["pedestrian.model"] = "nonInteracting"
-        sections["processing"].pop("lateral-resolution", None)
+        for option in ("lateral-resolution", "lanechange.duration"):
+            sections["processing"].pop(option, None)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<sumoConfiguration>"]
     for section, options in sections.items():
         lines.append(f"    <{section}>")
