@@ -1,0 +1,426 @@
+"""Road model to OpenDRIVE text: the other direction of :mod:`odscen.opendrive.parse`.
+
+Importers of other formats, and whatever changes a map, build the values of
+:mod:`odscen.opendrive.road_model` and write them here. What is written holds to the schema of the
+version in the header, 1.4 to 1.8, and reads back as the same model.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from lxml import etree
+
+from odscen.base.markup import number
+from odscen.opendrive.road_model import GeometryKind
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from odscen.opendrive.road_model import (
+        Controller,
+        Cubic,
+        Geometry,
+        Header,
+        Junction,
+        Lane,
+        LaneSection,
+        OpenDrive,
+        Outline,
+        Road,
+        RoadLink,
+        RoadObject,
+        Signal,
+        Validity,
+    )
+
+Element = etree._Element
+
+_SPEED_UNITS: Final = (("km/h", 3.6), ("mph", 1 / 0.44704), ("m/s", 1.0))
+_SHORTEST: Final = 1e-9
+"""Geometries of this length, metres, would have the length 0 when written."""
+_SPIRAL: Final = ("curvStart", "curvEnd")
+_PARAM_POLY3: Final = ("aU", "bU", "cU", "dU", "aV", "bV", "cV", "dV")
+
+
+def write_opendrive(model: OpenDrive, *, vendor: str = "odscen", date: str = "") -> bytes:
+    """Text of a map.
+
+    Parameters
+    ----------
+    model
+        Roads, junctions and controllers are written in the order of their dictionaries. ``notes``
+        and the header's ``crs`` are not: they are what reading adds.
+    vendor, date
+        Of the header; a date only where it is that of the data, as the same map has the same bytes.
+
+    Returns
+    -------
+    bytes
+        UTF-8. Lengths have nine digits behind the point, angles ten, coefficients twelve that
+        count, so that small differences of the arithmetic of machines do not show; geometries
+        shorter than a nanometre are left out.
+    """
+    root = etree.Element("OpenDRIVE")
+    _write_header(root, model.header, vendor, date)
+    for road in model.roads.values():
+        _write_road(root, road, model.header.rev_minor)
+    for controller in model.controllers.values():
+        _write_controller(root, controller)
+    for junction in model.junctions.values():
+        _write_junction(root, junction)
+    return etree.tostring(root, encoding="UTF-8", xml_declaration=True, pretty_print=True)
+
+
+def _add(parent: Element, tag: str, **attributes: str | float | None) -> Element:
+    """Append an element: numbers as lengths, ``None`` left out, a last underscore dropped."""
+    element = etree.SubElement(parent, tag)
+    for name, value in attributes.items():
+        if value is not None:
+            element.set(name.rstrip("_"), value if isinstance(value, str) else number(value, 9))
+    return element
+
+
+def _angle(value: float) -> str:
+    return number(math.remainder(value, 2.0 * math.pi), 10)
+
+
+def _coefficient(value: float) -> str:
+    return f"{value + 0.0:.12g}"  # + 0.0: no negative zero
+
+
+def _write_header(root: Element, header: Header, vendor: str, date: str) -> None:
+    element = _add(
+        root,
+        "header",
+        revMajor=str(header.rev_major),
+        revMinor=str(header.rev_minor),
+        name=header.name,
+        version="1.00",
+        date=date or None,
+        north=header.north,
+        south=header.south,
+        east=header.east,
+        west=header.west,
+        vendor=vendor,
+    )
+    if header.geo_reference:
+        _add(element, "geoReference").text = header.geo_reference
+    if any(header.offset):
+        x, y, z, hdg = header.offset
+        _add(element, "offset", x=x, y=y, z=z, hdg=_angle(hdg))
+
+
+# ----------------------------------------------------------------------------- roads
+def _write_road(root: Element, road: Road, rev_minor: int) -> None:
+    element = _add(
+        root,
+        "road",
+        name=road.name,
+        length=road.length,
+        id=road.id,
+        junction=road.junction or "-1",
+        rule=road.rule,
+    )
+    if road.predecessor or road.successor:
+        link = _add(element, "link")
+        _write_link(link, "predecessor", road.predecessor)
+        _write_link(link, "successor", road.successor)
+    for kind in road.types:
+        item = _add(element, "type", s=kind.s, type=kind.type)
+        if kind.speed is not None:
+            _write_speed(item, kind.speed)
+    plan = _add(element, "planView")
+    for geometry in road.geometry:
+        if geometry.length > _SHORTEST:
+            _write_geometry(plan, geometry)
+    if road.elevation:
+        _write_cubics(_add(element, "elevationProfile"), "elevation", road.elevation)
+    if road.superelevation:
+        _write_cubics(_add(element, "lateralProfile"), "superelevation", road.superelevation)
+    lanes = _add(element, "lanes")
+    _write_cubics(lanes, "laneOffset", road.lane_offset)
+    for section in road.sections:
+        _write_section(lanes, section, rev_minor)
+    if road.objects:
+        objects = _add(element, "objects")
+        for furniture in road.objects:
+            _write_object(objects, furniture)
+    if road.signals or road.signal_references:
+        signals = _add(element, "signals")
+        for signal in road.signals:
+            _write_signal(signals, signal)
+        for reference in road.signal_references:
+            place = _add(
+                signals,
+                "signalReference",
+                s=reference.s,
+                t=reference.t,
+                id=reference.id,
+                orientation=reference.orientation,
+            )
+            _write_validities(place, reference.validities)
+
+
+def _write_link(parent: Element, tag: str, link: RoadLink | None) -> None:
+    if link is None:
+        return
+    _add(
+        parent,
+        tag,
+        elementType=link.element_type,
+        elementId=link.element_id,
+        contactPoint=link.contact_point,
+        elementS=link.element_s,
+        elementDir=link.element_dir,
+    )
+
+
+def _write_speed(parent: Element, speed: float, **place: float) -> None:
+    """A limit in the unit in which it is a whole number: as signs have it."""
+    if math.isinf(speed):
+        _add(parent, "speed", **place, max="no limit")
+        return
+    for unit, per_mps in _SPEED_UNITS:
+        value = speed * per_mps
+        if unit == "m/s" or abs(value - round(value)) < 1e-6:
+            _add(parent, "speed", **place, max=number(value, 9), unit=unit)
+            return
+
+
+def _write_geometry(plan: Element, geometry: Geometry) -> None:
+    element = _add(
+        plan,
+        "geometry",
+        s=geometry.s,
+        x=geometry.x,
+        y=geometry.y,
+        hdg=_angle(geometry.hdg),
+        length=geometry.length,
+    )
+    names: Sequence[str] = {
+        GeometryKind.LINE: (),
+        GeometryKind.ARC: ("curvature",),
+        GeometryKind.SPIRAL: _SPIRAL,
+        GeometryKind.POLY3: tuple("abcd"),
+        GeometryKind.PARAM_POLY3: _PARAM_POLY3,
+    }[geometry.kind]
+    shape = _add(element, geometry.kind.value)
+    for name, value in zip(names, geometry.params, strict=True):
+        shape.set(name, _coefficient(value))
+    if geometry.kind is GeometryKind.PARAM_POLY3:
+        shape.set("pRange", "arcLength")
+
+
+def _write_cubics(
+    parent: Element, tag: str, records: Iterable[Cubic], *, start: float | None = None
+) -> None:
+    """Profiles over s; those of a lane over its offset from the ``start`` of its section."""
+    for record in records:
+        place = {"s": record.s} if start is None else {"sOffset": record.s - start}
+        element = _add(parent, tag, **place)
+        for name, value in zip("abcd", record[1:], strict=True):
+            element.set(name, _coefficient(value))
+
+
+# ----------------------------------------------------------------------------- lanes
+def _write_section(lanes: Element, section: LaneSection, rev_minor: int) -> None:
+    element = _add(lanes, "laneSection", s=section.s)
+    if section.single_side:
+        element.set("singleSide", "true")
+    ordered = sorted(section.lanes.values(), key=lambda lane: -lane.id)
+    for side, sign in (("left", 1), ("center", 0), ("right", -1)):
+        of_side = [lane for lane in ordered if (lane.id > 0) - (lane.id < 0) == sign]
+        if of_side:
+            container = _add(element, side)
+            for lane in of_side:
+                _write_lane(container, lane, section.s, rev_minor)
+
+
+def _write_lane(container: Element, lane: Lane, start: float, rev_minor: int) -> None:
+    element = _add(
+        container, "lane", id=str(lane.id), type=lane.type, level=str(lane.level).lower()
+    )
+    if lane.direction != "standard":
+        element.set("direction", lane.direction)
+    if lane.predecessors or lane.successors:
+        link = _add(element, "link")
+        for tag, linked in (("predecessor", lane.predecessors), ("successor", lane.successors)):
+            for lane_id in linked:
+                _add(link, tag, id=str(lane_id))
+    # Lanes have widths or borders; with both, which some files have, the widths hold.
+    _write_cubics(element, "width", lane.widths, start=start)
+    if not lane.widths:
+        _write_cubics(element, "border", lane.borders, start=start)
+    for mark in lane.road_marks:
+        _add(
+            element,
+            "roadMark",
+            sOffset=mark.s - start,
+            type=mark.type,
+            weight=mark.weight,
+            color=mark.color,
+            width=mark.width or None,
+            laneChange=mark.lane_change,
+        )
+    for limit in lane.speeds:
+        _write_speed(element, limit.max, sOffset=limit.s - start)
+    _write_access(element, lane, start, rev_minor)
+    for height in lane.heights:
+        _add(element, "height", sOffset=height.s - start, inner=height.inner, outer=height.outer)
+
+
+def _write_access(element: Element, lane: Lane, start: float, rev_minor: int) -> None:
+    """One element a restriction; from 1.8 on one element a place, with its restrictions below."""
+    group: Element | None = None
+    last: tuple[float, str] | None = None
+    for record in lane.access:
+        place = {"sOffset": record.s - start, "rule": record.rule or None}
+        if rev_minor < 8:
+            _add(element, "access", **place, restriction=record.restriction)
+            continue
+        if group is None or last != (record.s, record.rule):
+            group, last = _add(element, "access", **place), (record.s, record.rule)
+        _add(group, "restriction", type=record.restriction)
+
+
+# ----------------------------------------------------------------------------- furniture
+def _write_object(objects: Element, item: RoadObject) -> None:
+    element = _add(
+        objects,
+        "object",
+        id=item.id,
+        type=item.type or None,
+        subtype=item.subtype or None,
+        name=item.name or None,
+        s=item.s,
+        t=item.t,
+        zOffset=item.z_offset,
+        hdg=_angle(item.hdg),
+        pitch=_angle(item.pitch),
+        roll=_angle(item.roll),
+        orientation=item.orientation,
+        length=item.length,
+        width=item.width,
+        height=item.height,
+        radius=item.radius,
+        validLength=item.valid_length,
+    )
+    height, z_offset = item.height or 0.0, item.z_offset
+    for repeat in item.repeats:
+        _add(
+            element,
+            "repeat",
+            s=repeat.s,
+            length=repeat.length,
+            distance=repeat.distance,
+            tStart=repeat.t_start,
+            tEnd=repeat.t_end,
+            heightStart=height,
+            heightEnd=height,
+            zOffsetStart=z_offset,
+            zOffsetEnd=z_offset,
+        )
+    # Several outlines have a container since 1.5; a single one is where 1.4 and CARLA look for it.
+    several = len(item.outlines) > 1
+    container = _add(element, "outlines") if several else element
+    for number_, outline in enumerate(item.outlines):
+        _write_outline(container, str(number_), outline)
+    _write_validities(element, item.validities)
+
+
+def _write_outline(container: Element, name: str, outline: Outline) -> None:
+    element = _add(
+        container,
+        "outline",
+        id=name,
+        outer=str(outline.outer).lower(),
+        closed=str(outline.closed).lower(),
+    )
+    for corner in outline.corners:
+        if corner.local:
+            _add(element, "cornerLocal", u=corner.a, v=corner.b, z=corner.z, height=corner.height)
+        else:
+            _add(element, "cornerRoad", s=corner.a, t=corner.b, dz=corner.z, height=corner.height)
+
+
+def _write_signal(signals: Element, signal: Signal) -> None:
+    value, unit = signal.value, signal.unit
+    if unit == "m/s" and value is not None:
+        unit, factor = next(
+            (name, factor)
+            for name, factor in _SPEED_UNITS
+            if name == "m/s" or abs(value * factor - round(value * factor)) < 1e-6
+        )
+        value *= factor
+    element = _add(
+        signals,
+        "signal",
+        name=signal.name or None,
+        id=signal.id,
+        s=signal.s,
+        t=signal.t,
+        zOffset=signal.z_offset,
+        hOffset=_angle(signal.h_offset),
+        orientation=signal.orientation,
+        dynamic="yes" if signal.dynamic else "no",
+        country=signal.country or None,
+        type=signal.type,
+        subtype=signal.subtype,
+        value=None if value is None else number(value, 9),
+        unit=unit or None,
+        text=signal.text or None,
+        width=signal.width,
+        height=signal.height,
+    )
+    _write_validities(element, signal.validities)
+    for signal_id, kind in signal.dependencies:
+        _add(element, "dependency", id=signal_id, type=kind)
+
+
+def _write_validities(parent: Element, validities: Iterable[Validity]) -> None:
+    for validity in validities:
+        _add(
+            parent,
+            "validity",
+            fromLane=str(validity.from_lane),
+            toLane=str(validity.to_lane),
+        )
+
+
+# ----------------------------------------------------------------------------- junctions
+def _write_controller(root: Element, controller: Controller) -> None:
+    element = _add(
+        root,
+        "controller",
+        id=controller.id,
+        name=controller.name,
+        sequence=None if controller.sequence is None else str(controller.sequence),
+    )
+    for signal_id, kind in controller.controls:
+        _add(element, "control", signalId=signal_id, type=kind or None)
+
+
+def _write_junction(root: Element, junction: Junction) -> None:
+    element = _add(
+        root, "junction", id=junction.id, name=junction.name, mainRoad=junction.main_road
+    )
+    if junction.type != "default":
+        element.set("type", junction.type)
+    linked = "linkedRoad" if junction.type == "direct" else "connectingRoad"
+    for connection in junction.connections:
+        item = _add(
+            element,
+            "connection",
+            id=connection.id,
+            incomingRoad=connection.incoming_road,
+            **{linked: connection.connecting_road},
+            contactPoint=connection.contact_point,
+        )
+        for from_lane, to_lane in connection.lane_links:
+            _add(item, "laneLink", from_=str(from_lane), to=str(to_lane))
+    for priority in junction.priorities:
+        _add(element, "priority", high=priority.high, low=priority.low)
+    for sequence, controller in enumerate(junction.controllers):
+        _add(element, "controller", id=controller, type="0", sequence=str(sequence))
