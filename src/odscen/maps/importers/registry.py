@@ -13,6 +13,7 @@ from odscen.learning.offered_options import options_of, values_for
 from odscen.maps.importers.base import ImportedMap, ImportRecord, MapImporter
 from odscen.maps.importers.file_kinds import file_kind
 from odscen.maps.importers.opendrive import OpenDriveImporter
+from odscen.maps.importers.openstreetmap import OpenStreetMapImporter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Container
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 GROUP = "odscen.map_importers"
 """Group of entry points."""
 
-SHIPPED: tuple[type[MapImporter], ...] = (OpenDriveImporter,)
+SHIPPED: tuple[type[MapImporter], ...] = (OpenDriveImporter, OpenStreetMapImporter)
 """Importers of odscen's own, in the order in which they are listed."""
 
 _ORIGINAL = "original"
