@@ -231,7 +231,15 @@ def _commands(trial: Trial, workspace: Path) -> dict[str, list[str]]:
             str(workspace / "page.html"),
             *used,
         ],
-        "webster": ["signals", "webster", str(material.scenario), "--out", out, *used],
+        "webster": [
+            "signals",
+            "webster",
+            "--no-trial",
+            str(material.scenario),
+            "--out",
+            out,
+            *used,
+        ],
         "list": ["maps", "list", *used],
     }
 

@@ -139,7 +139,15 @@ def scenarios(trial: Trial) -> str:
             writes=[trial.folder / "exported"],
         )
     elif trial.rng.random() < 0.3:
-        trial.command("signals", "webster", str(file), "--out", str(trial.folder / "x.json"), *used)
+        trial.command(
+            "signals",
+            "webster",
+            "--no-trial",
+            str(file),
+            "--out",
+            str(trial.folder / "x.json"),
+            *used,
+        )
     return damage.kind
 
 

@@ -191,7 +191,15 @@ def options(trial: Trial) -> str:
             out + ".json",
             "--junction",
         ],
-        "saturation": ["signals", "webster", scenario, "--out", out + ".json", "--saturation"],
+        "saturation": [
+            "signals",
+            "webster",
+            "--no-trial",
+            scenario,
+            "--out",
+            out + ".json",
+            "--saturation",
+        ],
         "cycle": [
             "signals",
             "coordinate",

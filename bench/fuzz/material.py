@@ -99,7 +99,7 @@ def prepare(root: Path, limits: Limits) -> Material:
     )
     _ok(limits, root, "demand", "import", scenario, "--counts", str(root / "counts.csv"), *used)
     _ok(limits, root, "demand", "add", scenario, "--per-km", "3", *used)
-    _ok(limits, root, "signals", "webster", scenario, *used)
+    _ok(limits, root, "signals", "webster", "--no-trial", scenario, *used)
     _ok(limits, root, "signals", "export", scenario, "--out", str(root / "tll.add.xml"), *used)
     _ok(limits, root, "signals", "import", scenario, str(root / "tll.add.xml"), *used)
     _ok(limits, root, "export", str(sampled), "--to", "graphml", "--out", str(root), *used)

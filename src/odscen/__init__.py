@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from odscen.app.scenarios import check_scenario as check
     from odscen.app.scenarios import generate, read_scenario, write_scenario
     from odscen.app.signals.green_waves import coordinate_signals
+    from odscen.app.signals.signal_evaluation import evaluate_signals
     from odscen.app.signals.signal_optimisation import time_signals
     from odscen.app.signals.signal_plans import export_signals, import_signals, signal_programs
     from odscen.app.template_scenarios import template_scenario as place_template
@@ -57,8 +58,10 @@ if TYPE_CHECKING:
     from odscen.experiments.studies import resume_experiment, run_experiment
     from odscen.experiments.studies import study_results as experiment_results
     from odscen.experiments.suite import read_suite
-    from odscen.figures.judging.expectations import parse_expectation
+    from odscen.figures.judging.expectations import Expectation, parse_expectation
     from odscen.formats.base import Format
+    from odscen.lanegraph.query import NearestNode
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.learning.hetero_data import read_arrays
     from odscen.maps.importers.base import ImportedMap, ImportSettings, MapImporter
     from odscen.maps.map_entry import MapEntry
@@ -110,6 +113,7 @@ _HOMES = {
     "signal_programs": "odscen.app.signals.signal_plans",
     "import_signals": "odscen.app.signals.signal_plans",
     "export_signals": "odscen.app.signals.signal_plans",
+    "evaluate_signals": "odscen.app.signals.signal_evaluation",
     "time_signals": "odscen.app.signals.signal_optimisation",
     "coordinate_signals": "odscen.app.signals.green_waves",
     "scenario_arrays": "odscen.app.learner_arrays",
@@ -121,6 +125,9 @@ _HOMES = {
     "SpeedLaw": "odscen.scenario.story.motion_laws",
     "RunSettings": "odscen.runs.run_settings",
     "Recording": "odscen.runs.recording",
+    "BehaviourDoor": "odscen.learning.behaviour.behaviour_model",
+    "Expectation": "odscen.figures.judging.expectations",
+    "NearestNode": "odscen.lanegraph.query",
     "parse_expectation": "odscen.figures.judging.expectations",
     "run": "odscen.app.running.runs",
     "run_many": "odscen.app.running.batches",
@@ -155,11 +162,13 @@ _HOMES = {
 
 __all__ = [
     "ActionKind",
+    "BehaviourDoor",
     "ConditionKind",
     "ConflictError",
     "ConversionSettings",
     "Editing",
     "ElementOutcome",
+    "Expectation",
     "ExperimentPlan",
     "ExperimentResults",
     "Format",
@@ -171,6 +180,7 @@ __all__ = [
     "LimitError",
     "MapEntry",
     "MapImporter",
+    "NearestNode",
     "NotFoundError",
     "OdscenError",
     "Problem",
@@ -194,6 +204,7 @@ __all__ = [
     "compare",
     "coordinate_signals",
     "correct_matrix",
+    "evaluate_signals",
     "experiment_results",
     "export",
     "export_signals",

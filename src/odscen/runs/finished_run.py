@@ -7,8 +7,10 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args, get_type_hints
 
 from odscen.base.errors import InputError, NotFoundError, in_file
+from odscen.base.given_files import as_path
 from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.figures.measures.figure import Basis, SummaryPart
+from odscen.figures.measures.motion import read_motion
 from odscen.figures.measures.registry import names_of, run_figure
 from odscen.figures.measures.summary import ActorOutcome, actors_from_json
 from odscen.figures.measures.traffic_files import places_from_json, read_stations, read_tables
@@ -19,6 +21,7 @@ from odscen.records.run_plan import Plan
 from odscen.runs import layout
 from odscen.runs.deferred_figures import checked_summary, figure_of_actors, measured_summary
 from odscen.runs.ended import RECORDS_ONLY
+from odscen.runs.measured import measure_motion
 from odscen.runs.recorded import read_trajectories
 
 if TYPE_CHECKING:
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.base.given_files import GivenPath
     from odscen.figures.by_place.traffic import TableName
     from odscen.figures.measures.figure import RunFigure
 
@@ -68,7 +72,7 @@ class Run:
     known: Mapping[str, Any]
 
     @classmethod
-    def open(cls, folder: Path) -> Self:
+    def open(cls, folder: GivenPath) -> Self:
         """Open the folder of a run that has ended.
 
         Raises
@@ -78,7 +82,8 @@ class Run:
         DamagedError
             If a file of it is not as it was written; its report is not looked at.
         """
-        return cls(folder, checked_summary(folder, leave=(layout.REPORT_FILE,)))
+        opened = as_path(folder)
+        return cls(opened, checked_summary(opened, leave=(layout.REPORT_FILE,)))
 
     @property
     def summary(self) -> Mapping[str, Any]:
@@ -254,6 +259,32 @@ class Run:
             )
         plan = Plan.from_json(self._read_text(layout.PLAN_FILE))
         return body_centres(recorded.rows, plan).drop("row")
+
+    def motion(self) -> pl.DataFrame:
+        """Find motion that no body or driver makes, and hard braking.
+
+        Returns
+        -------
+        polars.DataFrame
+            One row per finding, in order of time: ``kind`` (jump, lateral speed, ...),
+            ``category``, ``id``, ``begin``, ``end`` (s), ``x``, ``y`` (m, body centre at its worst,
+            OpenDRIVE frame), ``lane`` (of SUMO), ``value`` (worst) and ``bound`` in the unit of the
+            kind, ``cause`` (rule, teleport and collision move by force), ``partner`` (of overlaps).
+
+        Raises
+        ------
+        InputError
+            If trajectories were not recorded, or more than 1 s apart.
+        """
+        found = read_motion(self.folder / layout.FIGURES_FOLDER)
+        if found is None and not self.known.get("meso"):
+            found = measure_motion(self.folder)
+        if found is None:
+            raise InputError(
+                "motion cannot be checked: no trajectories were recorded, or more than 1 s apart",
+                file=str(self.folder),
+            )
+        return found
 
     def lane_places(self) -> LanePlaces:
         """Segment, junction and movement of each SUMO lane: tables to join trajectories with.

@@ -10,11 +10,13 @@ import polars as pl
 
 from odscen.app.maps import load_map
 from odscen.base.errors import InputError, NotFoundError, in_file
+from odscen.base.given_files import as_path
 from odscen.base.stored_files import tables
 from odscen.base.text_files import write_text
 from odscen.figures.by_place.analysis_times import AnalysisTimes
 from odscen.figures.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.figures.by_place.traffic import TABLES, over_run
+from odscen.figures.measures.motion import read_motion
 from odscen.figures.measures.registry import figure_values
 from odscen.figures.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.figures.measures.summary import actors_from_json
@@ -49,6 +51,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.figures.by_place.corridors import Corridor
     from odscen.figures.by_place.parking_use import ParkingUse
     from odscen.figures.by_place.traffic import TrafficFigures
@@ -96,9 +99,10 @@ def write_report(
     """
     with in_file(str(folder)), tables(str(folder)):
         figures = read_tables(folder / layout.FIGURES_FOLDER) if data is None else data.traffic
+        motion = read_motion(folder / layout.FIGURES_FOLDER) if data is None else data.motion
         own = folder / layout.FIGURES_FOLDER
         stations = read_stations(own) if data is None else data.stations
-        page = _render_page(folder, summary, loaded, corridor, figures, stations)
+        page = _render_page(folder, summary, loaded, corridor, figures, stations, motion)
     return write_text(out or folder / layout.REPORT_FILE, page)
 
 
@@ -109,6 +113,7 @@ def _render_page(
     corridor: Corridor | None,
     figures: TrafficFigures | None,
     stations: pl.DataFrame | None,
+    motion: pl.DataFrame | None,
 ) -> str:
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8", errors="replace")
@@ -137,6 +142,7 @@ def _render_page(
         stations=stations,
         parking=_read_parking_use(folder, summary),
         assignment=_read_assignment(folder),
+        motion=motion,
     )
 
 
@@ -162,11 +168,11 @@ def _read_lights(folder: Path) -> LightsOfRun | None:
 
 def renew_report(
     workspace: Workspace,
-    run: Run | Path,
+    run: Run | GivenPath,
     *,
     corridor: Sequence[str] = (),
     ends: tuple[str, str] | None = None,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     warm_up: float | None = None,
     interval: float | None = None,
 ) -> Path:
@@ -203,11 +209,12 @@ def renew_report(
     DamagedError
         If a file of the run is not as it was written; that of the report is reported only.
     """
-    folder = _folder_of(workspace, run)
+    folder = folder_of(workspace, run)
+    file = None if out is None else as_path(out)
     _read_completed_summary(
         folder
     )  # which may have figures computed, and takes the run's lock for that
-    own = out is None and not unfinished(folder)
+    own = file is None and not unfinished(folder)
     with run_lock(folder) if own else nullcontext():
         summary = _read_completed_summary(folder)
         loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
@@ -217,16 +224,24 @@ def renew_report(
         data = None
         if (warm_up, interval) != (None, None):
             summary, data = _analyse_run(folder, summary, warm_up=warm_up, interval=interval)
-        report = write_report(folder, summary, loaded=loaded, corridor=along, out=out, data=data)
-        if out is None:
+        report = write_report(folder, summary, loaded=loaded, corridor=along, out=file, data=data)
+        if file is None:
             seal_again(folder, layout.REPORT_FILE)
     return report
 
 
-def _folder_of(workspace: Workspace, run: Run | Path) -> Path:
+def folder_of(workspace: Workspace, run: Run | GivenPath) -> Path:
+    """Folder of a run that is given by itself, its folder, or its name.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none.
+    """
     if isinstance(run, Run):
         return run.folder
-    folder = run if run.is_dir() else workspace.runs / run
+    own = as_path(run)
+    folder = own if own.is_dir() else workspace.runs / own
     if not folder.is_dir():
         names = [path.name for path in workspace.runs.glob("*")]
         raise NotFoundError("run", str(run), names)
@@ -270,7 +285,7 @@ def interval_rows(
     InputError
         If it has not completed, or times do not fit what was measured.
     """
-    folder = _folder_of(workspace, run)
+    folder = folder_of(workspace, run)
     summary, data = _analyse_run(
         folder, _read_completed_summary(folder), warm_up=warm_up, interval=interval
     )
