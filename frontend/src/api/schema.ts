@@ -990,6 +990,11 @@ export interface components {
             begin: number;
             end: number | null;
             profile: string | null;
+            /**
+             * @default even
+             * @enum {string}
+             */
+            arrivals: "even" | "random";
             mix: {
                 car?: number;
                 van?: number;
@@ -2598,6 +2603,11 @@ export interface components {
             begin: number;
             end: number | null;
             profile: string | null;
+            /**
+             * @default even
+             * @enum {string}
+             */
+            arrivals: "even" | "random";
             mix: {
                 car?: number;
                 van?: number;
@@ -3717,6 +3727,7 @@ export interface components {
             rules: components["schemas"]["StoryRule-Output"][];
             /** @default [] */
             criteria: string[];
+            sumo: components["schemas"]["SumoProject"] | null;
             parameters: {
                 [key: string]: components["schemas"]["Parameter"];
             };
@@ -3814,6 +3825,8 @@ export interface components {
             begin?: number;
             end?: number | null;
             profile?: string | null;
+            /** @enum {string} */
+            arrivals?: "even" | "random";
             mix?: {
                 car?: number;
                 van?: number;
@@ -3989,6 +4002,8 @@ export interface components {
             begin?: number;
             end?: number | null;
             profile?: string | null;
+            /** @enum {string} */
+            arrivals?: "even" | "random";
             mix?: {
                 car?: number;
                 van?: number;
@@ -4004,6 +4019,7 @@ export interface components {
             per_hour?: number | null;
             volumes?: number[];
             interval?: number;
+            peak_hour_factor?: number | null;
             to?: [
                 string,
                 number
@@ -4053,6 +4069,8 @@ export interface components {
             begin?: number;
             end?: number | null;
             profile?: string | null;
+            /** @enum {string} */
+            arrivals?: "even" | "random";
             mix?: {
                 car?: number;
                 van?: number;
@@ -4150,6 +4168,8 @@ export interface components {
             kind: "set_profile";
             profile: string;
             shares: number[];
+            begin?: number | null;
+            end?: number | null;
         };
         /** @description Change how trips of the demand choose their routes. */
         SetRoutesEdit: {
@@ -4772,6 +4792,36 @@ export interface components {
          */
         SummaryPart: "" | "actors" | "figures";
         /**
+         * @description A file of SUMO: ``packed`` is its text, compressed (zlib) and in base64.
+         *
+         *     ``elements`` says how many of each kind it has, for people.
+         */
+        SumoFile: {
+            name: string;
+            /** @enum {string} */
+            kind: "routes" | "additional";
+            packed: string;
+            elements: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * @description Files and options of a SUMO project.
+         *
+         *     ``begin`` is when its simulation begins, seconds; times of the run are those of SUMO, and
+         *     nothing happens before. ``options`` are SUMO's own, beside those that the simulation has;
+         *     without them the run has odscen's.
+         */
+        SumoProject: {
+            /** @default 0 */
+            begin: number;
+            options: {
+                [key: string]: string;
+            } | null;
+            /** @default [] */
+            files: components["schemas"]["SumoFile"][];
+        };
+        /**
          * @description One case: values of the parameters and of the columns, in their order.
          *
          *     ``safe`` is null where it has not been run, and ``detail`` says why. ``collision`` is a column
@@ -5086,6 +5136,8 @@ export interface components {
          *     with growing s. ``per_hour`` are all lanes together, with a ``profile`` on average over a day;
          *     or ``volumes`` are counted vehicles of slices of ``interval`` seconds from ``begin`` on. ``to``
          *     are zones or segments with their shares; without it, each draws one of the ends of the region.
+         *     ``peak_hour_factor`` is the volume of an hour divided by four times that of its busiest quarter,
+         *     which is the second of each hour from ``begin`` on; the other three are alike.
          */
         VehicleInput: {
             id: string;
@@ -5093,6 +5145,11 @@ export interface components {
             begin: number;
             end: number | null;
             profile: string | null;
+            /**
+             * @default even
+             * @enum {string}
+             */
+            arrivals: "even" | "random";
             mix: {
                 car?: number;
                 van?: number;
@@ -5111,6 +5168,7 @@ export interface components {
             volumes: number[];
             /** @default 900 */
             interval: number;
+            peak_hour_factor: number | null;
             /** @default [] */
             to: [
                 string,

@@ -81,6 +81,9 @@ class PlannedActor:
         when it takes one.
     appears
         Whether a rule lets it appear; until then it is not due, and ``depart`` is the run's end.
+    from_file
+        Whether it comes from a file of a SUMO project: where on its first edge it departs is
+        SUMO's choice.
     """
 
     id: str
@@ -106,6 +109,7 @@ class PlannedActor:
     begins_in: str | None = None
     ends_in: str | None = None
     appears: bool = False
+    from_file: bool = False
 
     @property
     def person(self) -> bool:
