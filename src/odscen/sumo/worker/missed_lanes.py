@@ -32,7 +32,7 @@ PERIOD = 5.0
 
 
 class MissedLanes:
-    """Gives other routes; nothing is kept between two looks, nor between slices of a run.
+    """Gives other routes, to no driver twice within :data:`PATIENCE`; slices of a run forget them.
 
     Parameters
     ----------
@@ -42,6 +42,7 @@ class MissedLanes:
 
     def __init__(self, net_offset: tuple[float, float]) -> None:
         self._offset = net_offset
+        self._changed: dict[str, float] = {}
 
     def due(self, begin: float, length: float) -> bool:
         """Whether to look before the step from ``begin`` that lasts ``length`` (s)."""
@@ -67,7 +68,7 @@ class MissedLanes:
         events = []
         for stopped in session.stopped.longer_than(PATIENCE):
             name = stopped.vehicle
-            if name in moved:
+            if name in moved or time - self._changed.get(name, -PATIENCE) < PATIENCE:
                 continue
             view = session.stopped.ahead(name)
             if view is None or view.onwards or view.beside is None:
@@ -76,6 +77,7 @@ class MissedLanes:
             front = session.vehicle_front(name)
             if route is None or not session.set_route(name, route):
                 continue
+            self._changed[name] = time
             dx, dy = self._offset
             events.append(
                 Event(
@@ -102,7 +104,10 @@ def _find_route(
     vclass = session.vehicle_class(name)
     ahead = session.route_ahead(name)
     shut = closed.get(vclass, frozenset())
-    if not ahead.edges or ahead.inside:
+    if len(ahead.edges) < 2 or ahead.inside:
+        return None
+    onwards = {edge for _, edge in session.lanes.onwards(lane, vclass)}
+    if ahead.edges[1] in onwards and session.stopped.is_at_red(name):
         return None
     here, goals = ahead.edges[0], (*session.stop_edges(name), ahead.edges[-1])
     lanes = session.lanes.in_order(here)
