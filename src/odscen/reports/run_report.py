@@ -601,6 +601,10 @@ EVENT_WORDS = {
         "was stranded",
         "A measure had closed every route to its goal; it was taken out.",
     ),
+    EventKind.ROUTE_CHANGED: (
+        "took another route",
+        "It did not get to the lane that its route needed.",
+    ),
     EventKind.MEASURE_BEGIN: ("began", ""),
     EventKind.MEASURE_END: ("ended", ""),
     EventKind.RULE_STARTED: ("began to do what a rule says", ""),

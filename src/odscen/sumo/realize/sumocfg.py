@@ -6,6 +6,7 @@ Paths are relative to the file. What each setting is for is said in ``docs/runs.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 from odscen.figures.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
@@ -25,6 +26,9 @@ from odscen.runs.layout import (
     TRIPINFO_FILE,
 )
 from odscen.runs.recording import REGION_ID, Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 POSITIONS_EVERY = 5.0
 """Seconds between the positions of a run without trajectories, which are not kept."""
@@ -70,6 +74,13 @@ Travel times are means of the last 3 min, and a route is changed for one that is
 """
 
 
+_NOT_OF_PROJECTS = (
+    "ignore-route-errors", "collision.action", "collision.mingap-factor",
+    "collision.check-junctions", "intermodal-collision.action", "pedestrian.striping.jamtime",
+)  # fmt: skip
+"""What a SUMO project has as SUMO itself has it, so that it runs as it did before."""
+
+
 @dataclass(frozen=True, slots=True)
 class SumocfgSettings:
     """What a sumocfg says.
@@ -104,6 +115,13 @@ class SumocfgSettings:
         Queues on road sections instead of single vehicles that follow each other: for scale.
     informed
         Whether there are drivers who look for quicker routes on the way.
+    begin
+        When the simulation begins, s.
+    routes, additional
+        Further files, of a SUMO project.
+    options
+        Options of a SUMO project; ``None`` without one. With one SUMO's own defaults hold where it
+        says nothing.
     """
 
     until: float
@@ -122,13 +140,17 @@ class SumocfgSettings:
     measures: bool = False
     meso: bool = False
     informed: bool = False
+    begin: float = 0.0
+    routes: tuple[str, ...] = ()
+    additional: tuple[str, ...] = ()
+    options: Mapping[str, str] | None = None
 
 
 def sumo_config(settings: SumocfgSettings) -> str:
     """Text of ``scenario.sumocfg``."""
     recording = settings.recording
-    inputs = {"net-file": NET_FILE, "route-files": ROUTES_FILE}
-    additional = [SIGNALS_FILE] if settings.signals else []
+    inputs = {"net-file": NET_FILE, "route-files": ",".join((*settings.routes, ROUTES_FILE))}
+    additional = [*settings.additional, *([SIGNALS_FILE] if settings.signals else [])]
     if settings.stops:
         additional.append(STOPS_FILE)
     additional += [PARKING_FILE] if settings.parking else []
@@ -143,7 +165,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
         "input": inputs,
         "output": _output_options(settings),
         "time": {
-            "begin": "0",
+            "begin": f"{settings.begin:g}",
             "end": f"{settings.until:g}",
             "step-length": f"{settings.step_length:g}",
         },
@@ -171,8 +193,14 @@ def sumo_config(settings: SumocfgSettings) -> str:
             "xml-validation": "never",
         },
     }
+    if settings.options is not None:
+        own = sections["processing"]
+        for name in _NOT_OF_PROJECTS:
+            own.pop(name)
+        own |= {name: value for name, value in settings.options.items() if name not in own}
     if settings.informed:
-        sections["routing"] = REROUTING
+        given = settings.options or {}
+        sections["routing"] = {n: v for n, v in REROUTING.items() if n not in given}
     if recording.criticality:
         sections["ssm_device"] = {**SSM_OPTIONS, "device.ssm.file": SSM_FILE}
     if settings.meso:
