@@ -123,8 +123,11 @@ SPEED_CORRELATION = -0.4
 EAGER_ACCELERATION = 0.15
 """Of the logarithm of the acceleration: who follows closely accelerates more."""
 LATERAL_SHARE = 0.3
-"""Of its speed that a vehicle moves aside at most, so that it does not while it is stopped: 17
-degrees of heading."""
+"""Of its speed that a vehicle moves aside at most, beside :data:`LATERAL_STANDING`: 17 degrees of
+heading."""
+LATERAL_STANDING = 0.5
+"""m/s that a stopped vehicle moves aside at most: with none, who has come to the end of its lane
+never leaves it."""
 ALWAYS = 1_000_000
 """Seconds after the beginning of red in which it is not heeded; more than any red lasts."""
 TWO_WHEELER_MIN_GAP = 0.5
@@ -311,7 +314,7 @@ def driver(
         ("tau", number(max(values.pop("tau"), step_length) * weather.headway)),
         ("sigma", number(values.pop("sigma"))),
         ("minGap", number(values.pop("minGap"))),
-        ("lcMaxSpeedLatStanding", "0"),
+        ("lcMaxSpeedLatStanding", number(LATERAL_STANDING)),
         ("lcMaxSpeedLatFactor", number(LATERAL_SHARE)),
         *((name, number(values[name])) for name in DRIVER_PARAMETERS if name in values),
         (
