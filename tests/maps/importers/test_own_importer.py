@@ -195,14 +195,14 @@ def test_a_package_that_cannot_be_imported_hides_no_other(installed: Path) -> No
     (installed / "my_maps.py").write_text("import nowhere")
     own_importer.forget()
     importers = map_importers()
-    assert list(importers.usable) == ["opendrive"]
+    assert list(importers.usable) == ["opendrive", "lanelet2"]
     assert importers.broken == {"road": "No module named 'nowhere'"}
     with pytest.raises(InputError, match=r"seems to be text: .*'road' cannot be used: No module"):
         importer_for(PLACE, "place.road")
 
 
 def test_opendrive_is_an_entry_of_the_list_and_is_asked_first() -> None:
-    assert list(map_importers().usable) == ["opendrive", "road"]
+    assert list(map_importers().usable) == ["opendrive", "lanelet2", "road"]
     assert importer_for(b"<OpenDRIVE/>", "town.xml").name == "opendrive"
     assert importer_for(b"<OpenDRIVE/>", "town.road").name == "opendrive"
     assert importer_for(b"anything", "town.XODR").name == "opendrive"

@@ -111,7 +111,7 @@ def _report_lanelets(
             continue
         places = built.places.get(lanelet.id, [])
         if not places:
-            reason = "it lies in a junction, and no way through it from road to road uses it"
+            reason = "it lies in a junction, and no path through it from road to road uses it"
             source.lose("lanelet", lanelet.id, reason)
             entries.append(source.entries.pop())
             continue
@@ -154,7 +154,7 @@ def _report_lanelets(
             ReportEntry(
                 ElementOutcome.LOST,
                 "junctions",
-                "there are more ways through junctions than are followed; some are left out",
+                "there are more paths through junctions than are followed; some are left out",
             )
         )
     return entries

@@ -217,7 +217,7 @@ def _add_stop_lines(things: Furniture) -> dict[str, tuple[RoadId, float]]:
         nodes = source.ways.get(way, ())
         if len(set(nodes)) < 2:
             things.report(
-                ElementOutcome.LOST, f"way {shown_id(way)}", "a stop line without length", way
+                ElementOutcome.LOST, f"line {shown_id(way)}", "a stop line without length", way
             )
             continue
         line = source.line(nodes)
@@ -225,7 +225,7 @@ def _add_stop_lines(things: Furniture) -> dict[str, tuple[RoadId, float]]:
         if road is None:
             things.report(
                 ElementOutcome.LOST,
-                f"way {shown_id(way)}",
+                f"line {shown_id(way)}",
                 "a stop line with no road within 3 m",
                 way,
             )
@@ -547,7 +547,7 @@ def _add_right_of_way(things: Furniture) -> None:
             if place is None:
                 things.report(
                     ElementOutcome.LOST,
-                    f"way {shown_id(way)}",
+                    f"line {shown_id(way)}",
                     f"a sign {shown(code)} of {path} with no lanelet of it on a road",
                     way,
                 )
@@ -732,7 +732,7 @@ def _add_areas(things: Furniture) -> None:
         if tags.get("area") == "yes" or kind == "parking_space" or kind.endswith("_area"):
             things.report(
                 ElementOutcome.LOST,
-                f"way {shown_id(way)}",
+                f"line {shown_id(way)}",
                 f"a polygon of the type {shown(kind)}: nothing of OpenDRIVE says the same",
                 way,
             )

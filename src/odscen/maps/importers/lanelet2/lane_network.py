@@ -339,7 +339,9 @@ def _cut_group(
         middle_at = (edges[part] + edges[part + 1]) / 2.0
         yield Group(
             [
-                replace(lanelet, id=f"{lanelet.id}/{part + 1}", left=left, right=right)
+                replace(
+                    lanelet, id=f"{lanelet.id}/{part + 1}", left=left, right=right, part=part + 1
+                )
                 for lanelet, left, right in zip(
                     group.lanelets, sliced[:-1], sliced[1:], strict=True
                 )

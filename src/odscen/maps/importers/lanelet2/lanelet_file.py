@@ -89,6 +89,8 @@ class Lanelet:
         Ids of its regulatory elements.
     is_copy
         Whether it is the second direction of a lanelet that is driven both ways.
+    part
+        Number of the part, if it was cut; 0 for a whole one.
     """
 
     id: str
@@ -99,6 +101,7 @@ class Lanelet:
     tags: Tags
     regulations: tuple[str, ...] = ()
     is_copy: bool = False
+    part: int = 0
 
 
 @dataclass(slots=True)
@@ -182,7 +185,7 @@ def read_lanelet_file(content: bytes, *, origin: str = "") -> LaneletMap:
     for way, refs in ways.items():
         known = tuple(ref for ref in refs if ref in points)
         if len(known) < len(refs):
-            found.lose("way", way, "it names nodes that are not in the file; they are left out")
+            found.lose("line", way, "it names nodes that are not in the file; they are left out")
         # A node that follows itself adds nothing.
         found.ways[way] = tuple(
             node for k, node in enumerate(known) if k == 0 or node != known[k - 1]
@@ -400,7 +403,7 @@ def _add_lanelet(
         ways = [way for kind, way in members.get(role, ()) if kind == "way"]
         missing = [way for way in ways if way not in found.ways]
         if missing or not ways:
-            reason = f"way {missing[0]} is not in the file" if missing else "it has none"
+            reason = f"line {missing[0]} is not in the file" if missing else "it has none"
             found.lose("lanelet", identity, f"its {role} bound cannot be read: {reason}")
             return
         bound = join_ways([(way, found.ways[way]) for way in ways])

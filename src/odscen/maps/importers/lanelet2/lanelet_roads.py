@@ -93,13 +93,17 @@ _PARTICIPANTS: Final = {
 
 
 class LanePlace(NamedTuple):
-    """Where a lanelet, or a part of one, is: road, lane, s from and to, and whether along s."""
+    """Where a lanelet, or a part of one, is: road, lane, s from and to, and whether along s.
+
+    ``part`` is the number of the part, 0 for a whole lanelet.
+    """
 
     road: RoadId
     lane: int
     start: float
     end: float
     along: bool
+    part: int
 
 
 @dataclass(slots=True, eq=False)
@@ -204,6 +208,8 @@ def build_roads(network: LaneNetwork, strips: Sequence[Strip], *, first_id: int 
         others.append(connection._replace(id=str(len(others))))
     for junction, rows in connections.items():
         built.junctions[junction] = Junction(junction, "", "default", tuple(rows))
+    for places in built.places.values():
+        places.sort(key=lambda place: place.part)
     used = {n for path in paths for n in path.inside}
     built.lost_parts = [
         lanelet.id
@@ -526,7 +532,14 @@ def _build_road(
         steps += [
             (
                 lanelet,
-                LanePlace(laid.id, lane_id, edges[k], edges[k + 1], laid.along[column]),
+                LanePlace(
+                    laid.id,
+                    lane_id,
+                    edges[k],
+                    edges[k + 1],
+                    laid.along[column],
+                    lanelet.part,
+                ),
             )
             for k, lanelet in enumerate(lanelets)
         ]
