@@ -95,7 +95,7 @@ class Furniture:
             shared = outline.intersection(shape) if apart == 0.0 else None
             much = 0.0 if shared is None else max(shared.area, 0.1 * shared.length)
             connects = self.built.roads[road].road.junction is not None
-            if across is not None and much:
+            if across is not None and shared is not None and much:
                 fitted = self.built.roads[road].fitted
                 place = shapely.get_coordinates(shared.centroid)
                 _, hdg = fitted.frame(float(fitted.locate(place)[0][0]))

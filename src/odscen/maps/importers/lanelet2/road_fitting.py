@@ -342,7 +342,7 @@ def _choose_stations(plan: PlanView, length: float, borders: Sequence[FloatArray
     bent = np.abs(plan.at(np.zeros(fine.size, dtype=np.int64), fine).curvature) > _BENT
     even = np.concatenate([coarse, fine[bent]])
     corners = [_locate(plan, length, border)[0] for border in borders]
-    stations = np.sort(np.concatenate([even, *corners]))
+    stations: FloatArray = np.sort(np.concatenate([even, *corners]))
     kept = np.concatenate([[True], np.diff(stations) > 1e-3])
     stations = stations[kept]
     stations[0], stations[-1] = 0.0, length
