@@ -94,6 +94,7 @@ HIDDEN = (
     "web/http_server",
     "maps/map_pictures",
     "maps/shipped",
+    "maps/traffic_losses",
 )
 
 # Pydantic's findings that a document or a request can have, with what they need to be made.

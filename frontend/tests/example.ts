@@ -164,6 +164,8 @@ export const mapInfo = (name: string, junctions: number): MapInfo => ({
   importer: "opendrive",
   opendrive: { version: "1.7", rule: "RHT" },
   report_counts: {},
+  lost: {},
+  guessed: {},
   network: { converter: "odscen", source: null },
   preview: "",
   outdated: false,

@@ -2488,6 +2488,12 @@ export interface components {
                 guessed?: number;
                 lost?: number;
             };
+            lost: {
+                [key: string]: number;
+            };
+            guessed: {
+                [key: string]: number;
+            };
             preview: string;
             outdated: boolean;
             semantics: components["schemas"]["SemanticsInfo"];
@@ -2501,6 +2507,7 @@ export interface components {
         /**
          * @description A map of the catalogue; ``report_counts`` says how many elements had which outcome.
          *
+         *     ``lost`` and ``guessed`` count what matters for traffic.
          *     ``importer`` has read its file ``source``: ``opendrive``, or that of another format.
          *
          *     An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
@@ -2520,6 +2527,12 @@ export interface components {
                 repaired?: number;
                 guessed?: number;
                 lost?: number;
+            };
+            lost: {
+                [key: string]: number;
+            };
+            guessed: {
+                [key: string]: number;
             };
             preview: string;
             outdated: boolean;

@@ -5,6 +5,7 @@ import { Trans } from "@lingui/react/macro";
 import type { MapInfo } from "../api/types";
 import { IconTrash } from "../ui/icons";
 import { mapFacts, networkFact } from "../ui/words";
+import { lossWords } from "./losses";
 import { Preview } from "./Preview";
 
 /** A map with its picture and what there is in it. */
@@ -41,6 +42,16 @@ export function MapCard({
             <li key={fact}>{fact}</li>
           ))}
         </ul>
+        {Object.keys(map.lost).length > 0 && (
+          <Text size="sm" c="dimmed" mb={8}>
+            <Trans>Lost for traffic: {lossWords(map.lost).join(", ")}</Trans>
+          </Text>
+        )}
+        {Object.keys(map.guessed).length > 0 && (
+          <Text size="sm" c="dimmed" mb={8}>
+            <Trans>Guessed: {lossWords(map.guessed).join(", ")}</Trans>
+          </Text>
+        )}
         {map.outdated && (
           <Text size="sm" c="dimmed" mb={8}>
             <Trans>Built by an earlier odscen: it is rebuilt when it is first opened.</Trans>

@@ -33,6 +33,14 @@ test("a map that an earlier odscen has built says so", async () => {
   expect(await screen.findAllByText(/^Built by an earlier odscen/)).toHaveLength(1);
 });
 
+test("a map says what of it was lost for traffic, and what was guessed", async () => {
+  const lossy = { ...mapInfo("Village", 0), lost: { signals: 2, roads: 1 }, guessed: { connections: 3 } };
+  server({ "/scenarios": [], "/maps": [mapInfo("Town", 9), lossy] });
+  show(<CatalogueView />);
+  expect(await screen.findAllByText("Lost for traffic: 2 lights and signs, 1 road")).toHaveLength(1);
+  expect(screen.getAllByText("Guessed: 3 connections")).toHaveLength(1);
+});
+
 test("without maps the example maps are offered", async () => {
   server({ "/scenarios": [], "/maps": [] });
   show(<CatalogueView />);

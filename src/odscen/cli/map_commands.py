@@ -391,52 +391,14 @@ def _warn_of_network(name: str, missed: list[dict[str, Any]]) -> str:
 
 
 def _describe_added(entry: MapEntry) -> str:
+    from odscen.maps.traffic_losses import traffic_losses
+
     graph = entry.info["graph"]
+    losses = traffic_losses(entry.info.get("report", {}))
     return (
         f"{entry.name}: {graph['nodes']:,} nodes, {graph['segments']:,} segments, "
-        f"built in {entry.info['build_seconds']:.1f} s{_describe_losses(entry)}"
+        f"built in {entry.info['build_seconds']:.1f} s{losses}"
     )
-
-
-_LOSSES = (
-    ("roads", "[road-left-out]"),
-    ("connections", "[connection-left-out]"),
-    ("connections", "connecting lane "),
-    ("connections", "no vehicle class may use"),
-    ("access rules", "access"),
-    ("crosswalks", "crosswalk"),
-)
-"""What is lost for traffic, by what the reason of the report has; signals by their element."""
-_SINGLE = {
-    "roads": "road",
-    "connections": "connection",
-    "access rules": "access rule",
-    "crosswalks": "crosswalk",
-    "lights and signs": "light or sign",
-    "signs not understood": "sign not understood",
-}
-
-
-def _describe_losses(entry: MapEntry) -> str:
-    """Say what of a map is lost for traffic; nothing if nothing is."""
-    counts: Counter[str] = Counter()
-    for row in entry.info.get("report", {}).get("entries", ()):
-        if row["fate"] != "lost":
-            continue
-        element, reason = row["element"], row["reason"]
-        if element.startswith("signals of type"):
-            counts["signs not understood"] += int(reason.partition(" ")[0])
-        elif "> signal" in element:
-            counts["lights and signs"] += 1
-        else:
-            kind = next((kind for kind, words in _LOSSES if words in reason), None)
-            counts.update(() if kind is None else (kind,))
-    if not counts:
-        return ""
-    lost = ", ".join(
-        f"{count} {_SINGLE[kind] if count == 1 else kind}" for kind, count in sorted(counts.items())
-    )
-    return f"; lost for traffic: {lost}"
 
 
 def _plain_value(value: object) -> object:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import sys
+from dataclasses import replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Final, TypeVar
 
@@ -30,6 +31,7 @@ from odscen.opendrive.parse_xml import (
     unread,
 )
 from odscen.opendrive.road_model import (
+    DRIVABLE_TYPES,
     Lane,
     LaneAccess,
     LaneChange,
@@ -109,6 +111,7 @@ def _parse_section(element: Element, s: float, s_end: float, notes: Notes) -> La
         notes.add(Rule.NO_CENTER, element, "there is no center lane")
         found.append(Lane(0, "none"))
     found.sort(key=lambda lane: -lane.id)
+    found = _open_sole_lane(found)
     _check_ids(element, [lane.id for lane in found], notes)
     return LaneSection(
         s,
@@ -116,6 +119,19 @@ def _parse_section(element: Element, s: float, s_end: float, notes: Notes) -> La
         {lane.id: lane for lane in found},
         single_side=_drawn_boolean(element, "singleSide", notes),
     )
+
+
+def _open_sole_lane(lanes: list[Lane]) -> list[Lane]:
+    """Make the only lane of a narrow road one for driving, as 1.8 has it: open both ways.
+
+    Up to 1.7 such a lane has the type ``bidirectional``, as has that in the middle of a road on
+    which both directions turn left.
+    """
+    sole = [n for n, lane in enumerate(lanes) if lane.type == "bidirectional"]
+    if len(sole) != 1 or any(lane.type in DRIVABLE_TYPES for lane in lanes):
+        return lanes
+    opened = replace(lanes[sole[0]], type="driving", direction="both")
+    return [opened if n == sole[0] else lane for n, lane in enumerate(lanes)]
 
 
 def _drawn_boolean(element: Element, name: str, notes: Notes) -> bool:

@@ -343,15 +343,18 @@ class OpenDrive:
 
 DRIVABLE_TYPES = frozenset(
     {"driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane"}
-    | {"bus", "taxi", "HOV", "mwyEntry", "mwyExit"}
+    | {"bus", "taxi", "HOV", "mwyEntry", "mwyExit", "shared"}
 )
-"""Lane types (1.4 to 1.8) on whose lanes motor vehicles are placed and routed."""
+"""Lane types (1.4 to 1.8) on whose lanes motor vehicles are placed and routed.
+
+``shared`` is for all road users; a lane for cyclists and walkers is one by its access (1.8).
+"""
 
 WALKABLE_TYPES = frozenset({"sidewalk", "walking"})
 """Lane types on which pedestrians are placed and routed; ``walking`` is 1.8's name."""
 
 _USES_BY_ACCESS: tuple[tuple[str, frozenset[str]], ...] = (
-    ("biking", frozenset({"bicycle"})),
+    ("biking", frozenset({"bicycle", "pedestrian"})),
     ("walking", frozenset({"pedestrian"})),
     ("taxi", frozenset({"taxi", "emergency"})),
     ("bus", frozenset({"bus", "taxi", "emergency"})),
@@ -362,6 +365,10 @@ _USES_BY_ACCESS: tuple[tuple[str, frozenset[str]], ...] = (
 Version 1.8 has no types ``bus``, ``taxi`` and ``HOV`` any more; its files say the same by access.
 """
 _NAMESAKES = {"biking": "bicycle", "walking": "pedestrian"}
+_VEHICLES = frozenset(
+    {"passengerCar", "bus", "delivery", "emergency", "taxi", "truck", "trucks", "motorcycle", "HOV"}
+)
+"""Who drives, by the standard's names of road users."""
 
 
 def access_at(lane: Lane, s: float) -> tuple[LaneAccess, ...]:
@@ -373,9 +380,10 @@ def access_at(lane: Lane, s: float) -> tuple[LaneAccess, ...]:
 def lane_use(lane: Lane) -> str:
     """What a lane is used as: its type, or what its access makes of a lane for driving.
 
-    Only access that holds along the whole lane makes it another one.
+    Only access that holds along the whole lane makes it another one. On a ``restricted`` lane no
+    cars drive, but those do whom its access allows.
     """
-    if not lane.access or lane.type not in {"driving", "shared"}:
+    if not lane.access or lane.type not in {"driving", "shared", "restricted"}:
         return lane.type
     first = lane.access[0].s
     if any(record.s != first or record.rule != "allow" for record in lane.access):
@@ -386,4 +394,6 @@ def lane_use(lane: Lane) -> str:
     for use, names in _USES_BY_ACCESS:
         if _NAMESAKES.get(use, use) in admitted and admitted <= names:
             return use
+    if lane.type == "restricted" and admitted & _VEHICLES:
+        return "driving"
     return lane.type

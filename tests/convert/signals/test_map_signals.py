@@ -178,7 +178,7 @@ def test_types_in_words_make_the_same_network_as_numbers(word: str, number: str)
 
 
 def test_what_is_no_known_light_or_leads_to_no_junction_is_lost_with_its_reason() -> None:
-    alone = road("7", inside=f"<signals>{signal(2, LIGHT, '+', 50.0)}</signals>", plan=(
+    alone = road("7", inside=f"<signals>{signal(2, '206', '+', 50.0)}</signals>", plan=(
         '<geometry s="0" x="0" y="200" hdg="0" length="100"><line/></geometry>'
     ))  # fmt: skip
     network = made(crossing({"1": signal(1, "vms")}, alone))
@@ -204,7 +204,7 @@ def test_a_junction_whose_controller_names_nothing_is_lost() -> None:
 
 
 def test_signals_with_one_id_are_each_kept_or_lost() -> None:
-    text = crossing({"1": signal(1, LIGHT), "2": signal(1, LIGHT, "-", 2.0)})
+    text = crossing({"1": signal(1, LIGHT), "2": signal(1, "206", "-", 2.0)})
     network = made(text)
     elements = {
         (e.outcome, e.element)
@@ -244,3 +244,50 @@ def test_stop_signs_of_a_shipped_map_may_be_reversed_without_another_network() -
 def test_a_sign_on_a_road_without_junctions_is_lost() -> None:
     lone = road("8", lanes=section(lane(-1)), inside=f"<signals>{signal(5, '206', '-')}</signals>")
     assert entries(made(document(lone)), ElementOutcome.LOST).keys() == {"5"}
+
+
+def priority_sign(number: int, country: str = "DE", code: str = "306") -> str:
+    return signal(number, code, more=f'country="{country}"').replace('dynamic="yes"', "")
+
+
+def yielding(network: Converted) -> set[str]:
+    """Roads whose vehicles wait for others at the junction."""
+    return {
+        link.get("from").split(".")[0]
+        for link in network.xml.iter("connection")
+        if link.get("via") and link.get("state") == "m" and not link.get("from").startswith(":")
+    }
+
+
+@pytest.mark.parametrize(
+    ("country", "code"),
+    [("DE", "306"), ("DE", "301"), ("SE", "B4"), ("FR", "AB6"), ("FR", "AB2"), ("RU", "2.1")],
+)
+def test_priority_signs_of_a_junction_let_the_other_roads_wait(country: str, code: str) -> None:
+    signs = {name: priority_sign(int(name), country, code) for name in ("2", "4")}
+    network = made(crossing(signs))
+    assert yielding(network) == {"1", "3"}
+    kept = entries(network, ElementOutcome.KEPT)
+    assert kept == dict.fromkeys(
+        ("2", "4"), "priority sign, as right of way in SUMO: the other approaches give way"
+    )
+    assert not any("priority" in e.reason for e in network.network.report.entries
+                   if e.outcome is ElementOutcome.GUESSED)  # fmt: skip
+
+
+def test_a_priority_sign_holds_for_the_approach_straight_opposite() -> None:
+    assert yielding(made(crossing({"2": priority_sign(2)}))) == {"1", "3"}
+
+
+def test_signs_to_give_way_go_before_priority_signs() -> None:
+    signs = {"2": priority_sign(2), "4": signal(4, "205")}
+    network = made(crossing(signs))
+    assert network.network.net_xml == made(crossing({"4": signs["4"]})).network.net_xml
+    told = {e.element: e.outcome for e in network.network.report.entries}
+    assert told["signals of type DE 306"] is ElementOutcome.GUESSED
+
+
+def test_priority_signs_on_all_approaches_distinguish_none() -> None:
+    signs = {name: priority_sign(int(name)) for name in LEGS}
+    network = made(crossing(signs))
+    assert network.network.net_xml == made(crossing({})).network.net_xml

@@ -20,7 +20,7 @@ from odscen.opendrive.sign_catalogue import country_of, sign_meaning
 from odscen.opendrive.topology import dead_ends, one_sided_links
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Container, Iterator, Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
     from odscen.convert.lane_table.table import LaneTable
@@ -71,6 +71,9 @@ def _find_outermost_edge(edges: Sequence[EdgePlan], numbers: Sequence[int], *, a
 
 BOTH_WAYS = "bidirectional"
 """Lane type (up to 1.7) of lanes for both directions, mostly for turning left from the middle."""
+
+RAIL_TYPES = frozenset({"tram", "rail"})
+"""Lane types for vehicles that no scenario has."""
 
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
@@ -176,6 +179,10 @@ def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> It
             reason = f"lanes of type {kind} are open to no road user and left out"
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
+            elif kind in RAIL_TYPES:
+                reason = f"lanes of type {kind} are for rail vehicles, no road users: left out"
+            elif kind == "restricted":
+                reason = "lanes of type restricted, on which no access allows vehicles: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(key.road)}", reason)
 
 
@@ -277,7 +284,9 @@ def _find_signal_entries(
     odr: OpenDrive, table: RoadTable, net: Net, control: SignalControl
 ) -> Iterator[ReportEntry]:
     unplaced, guessed = dict(control.unplaced), dict(control.guessed)
+    favoured = dict(control.favoured)
     crossed = _lit_crossings(net)
+    walked = {name for light in net.lights for names in light.signals for name in names}
     for road in odr.roads.values():
         for signal in road.signals:
             element = f"road {shown_id(road.id)} > signal {shown_id(signal.id)}"
@@ -286,9 +295,18 @@ def _find_signal_entries(
                 yield ReportEntry(ElementOutcome.LOST, element, unplaced[element])
             elif element in guessed:
                 yield ReportEntry(ElementOutcome.GUESSED, element, guessed[element])
+            elif element in favoured:
+                reason = "priority sign, as right of way in SUMO: the other approaches give way"
+                yield ReportEntry(ElementOutcome.KEPT, element, reason)
+            elif element in control.stops:
+                reason = "traffic light on a plain road: vehicles stop there, as before a junction"
+                yield ReportEntry(ElementOutcome.KEPT, element, reason)
             elif kind in ("traffic_light", "stop", "yield"):
                 word = kind.replace("_", " ")
                 yield ReportEntry(ElementOutcome.KEPT, element, f"{word}, as right of way in SUMO")
+            elif kind == "pedestrian_light" and signal.id in walked:
+                reason = "pedestrian light at a crosswalk: vehicles have one there in SUMO, too"
+                yield ReportEntry(ElementOutcome.GUESSED, element, reason)
             elif kind == "pedestrian_light":
                 yield _walk_light(element, table.road_index[road.id], signal, table, crossed)
             elif signal.dynamic:
@@ -296,7 +314,7 @@ def _find_signal_entries(
                     f"dynamic signal of type {signal.type or 'none'!r}, which is no known light"
                 )
                 yield ReportEntry(ElementOutcome.LOST, element, reason)
-    yield from _count_idle_signs(odr)
+    yield from _count_idle_signs(odr, favoured)
     yield from _bare_controllers(odr, net)
     if net.lights:
         reason = (
@@ -318,12 +336,14 @@ _IDLE_SIGNS = {
 """What holds instead of signs that are understood, and have no effect of their own."""
 
 
-def _count_idle_signs(odr: OpenDrive) -> Iterator[ReportEntry]:
-    """Count the signs that have no effect in SUMO, by country and type."""
+def _count_idle_signs(odr: OpenDrive, acting: Container[str]) -> Iterator[ReportEntry]:
+    """Count the signs that have no effect in SUMO, by country and type; ``acting`` are others."""
     counts: Counter[tuple[str, str]] = Counter()
     for road in odr.roads.values():
         for signal in road.signals:
             kind = signal_kind(signal)
+            if f"road {shown_id(road.id)} > signal {shown_id(signal.id)}" in acting:
+                continue
             if kind not in ("other", "speed_limit") or (signal.dynamic and kind == "other"):
                 continue
             meaning = "speed_limit" if kind == "speed_limit" else sign_meaning(signal) or ""

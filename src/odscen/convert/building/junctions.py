@@ -268,6 +268,8 @@ class Surroundings(NamedTuple):
         Controller of each signal.
     xodr
         OpenDRIVE junctions, for the file.
+    walk_signals
+        Pedestrian lights of a crosswalk on a plain road.
     """
 
     place: tuple[float, float, float]
@@ -277,6 +279,7 @@ class Surroundings(NamedTuple):
     controllers: Mapping[str, str]
     lefthand: bool
     xodr: str
+    walk_signals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -314,13 +317,18 @@ def build_junction(
         Sorted by the walking area at which they start.
     """
     signalled = any(passage.lights for passage in passages)
+    # Pedestrian lights alone: vehicles have a light as well, or nobody could ever cross.
+    signalled_walk = not signalled and bool(around.walk_signals and crossings and passages)
+    signalled |= signalled_walk
     if signalled:
-        passages = _obey_approach_signals(passages)
+        # At a light on a plain road the lanes beside those that it is valid for are free.
+        whole = bool(around.xodr or crossings)
+        passages = _obey_approach_signals(passages, whole_edges=whole)
     cars = ["passenger" in passage.allowed for passage in passages]
     walkways = [crossing.walkway for crossing in crossings]
     ruling = ruled(
         _mark_unsignalled_yield(passages)
-        if signalled
+        if signalled and not signalled_walk
         else [passage.movement for passage in passages],
         walkways,
         cars,
@@ -379,7 +387,7 @@ def _source_lanes(passages: Sequence[Passage]) -> list[SumoLaneId]:
     return [lane_id(*passage.movement.source) for passage in passages]
 
 
-def _obey_approach_signals(passages: Sequence[Passage]) -> list[Passage]:
+def _obey_approach_signals(passages: Sequence[Passage], *, whole_edges: bool) -> list[Passage]:
     """Let passages without a signal obey those of the lane, or else edge, that they come from."""
     result: list[Passage] = []
     for passage in passages:
@@ -387,7 +395,9 @@ def _obey_approach_signals(passages: Sequence[Passage]) -> list[Passage]:
         same = [
             (other.movement.source[1] != lane, other.lights)
             for other in passages
-            if other.lights and other.movement.source[0] == edge
+            if other.lights
+            and other.movement.source[0] == edge
+            and (whole_edges or other.movement.source[1] == lane)
         ]
         lights = passage.lights or (min(same)[1] if same else ())
         result.append(replace(passage, lights=lights))
@@ -496,6 +506,7 @@ def _build_light(
 ) -> tuple[TrafficLight, dict[int, int]]:
     """Traffic light of a junction, and the row in it of each link that it rules."""
     controlled = [n for n, passage in enumerate(passages) if passage.lights]
+    controlled = controlled or list(range(len(passages)))
     count = len(passages)
     rows = {
         link: row for row, link in enumerate((*controlled, *range(count, count + len(crossings))))
@@ -514,7 +525,7 @@ def _build_light(
     light = TrafficLight(
         name,
         program(light_stages(links, rows), len(rows)),
-        signals=tuple(passages[n].lights if n < count else () for n in rows),
+        signals=tuple(passages[n].lights if n < count else around.walk_signals for n in rows),
         links=light_links(rows, links.movements, crossings, ruling.conflicts.crossed),
         conflicts=link_conflicts(links, rows),
     )

@@ -12,9 +12,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+import shapely
 
 from odscen.base.ids import Roadside, SumoEdgeId, SumoLaneId
-from odscen.convert.building.findings import findings
+from odscen.convert.building.findings import CROSSING_REACH, findings
 from odscen.convert.building.junctions import Passage, Surroundings, build_junction, outline
 from odscen.convert.building.nodes import find_nodes, plain_ids
 from odscen.convert.lane_table.sumo_network import SumoNetwork
@@ -37,23 +38,26 @@ from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
 from odscen.convert.model.net_ids import lane_id
 from odscen.convert.model.net_xml import net_xml
-from odscen.convert.model.right_of_way import Movement, wrapped
+from odscen.convert.model.right_of_way import OPPOSING, Movement, Sign, wrapped
 from odscen.convert.pedestrian.crosswalks import place_crosswalks
 from odscen.convert.pedestrian.pedestrian_network import build_walks
 from odscen.convert.signals.map_signals import signal_control
+from odscen.convert.signals.road_lights import cut_for_lights
+from odscen.opendrive.objects import signal_kind
 from odscen.opendrive.topology import lane_successors, side_links
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from odscen.base.ids import JunctionId, LaneKey
+    from odscen.base.ids import JunctionId, LaneKey, RoadId
     from odscen.convert.building.junctions import BuiltJunction
     from odscen.convert.building.nodes import Nodes
     from odscen.convert.model.connections import PlannedConnection, PlannedConnections
-    from odscen.convert.model.edge_plan import EdgePlan
+    from odscen.convert.model.edge_plan import EdgePlan, RoadGap
     from odscen.convert.model.lane_alignment import LaneAlignment, Line
     from odscen.convert.pedestrian.pedestrian_network import WalkNet
-    from odscen.convert.signals.map_signals import SignalControl
+    from odscen.convert.signals.map_signals import Acting, SignalControl
+    from odscen.convert.signals.road_lights import RoadStop
     from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive
@@ -243,12 +247,20 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     successors = lane_successors(odr)
     sides = side_links(odr)
     crosswalks, under = place_crosswalks(odr, table)
-    gaps = merge_gaps(odr, under, side_gaps(sides))
-    plans = plan_edges(odr, table, successors, gaps, lefthand=lefthand)
-    found = _open_connections(odr, table, find_connections(table, successors, plans, sides))
-    nodes = find_nodes(odr, table, found, gaps, crosswalks, sides)
-    on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
-    builder = _NetworkBuilder(odr, table, found, nodes, on_foot, lefthand=lefthand)
+    gaps: Mapping[RoadId, Sequence[RoadGap]] = merge_gaps(odr, under, side_gaps(sides))
+    stops: Mapping[Acting, RoadStop] = {}
+    while True:
+        plans = plan_edges(odr, table, successors, gaps, lefthand=lefthand)
+        found = _open_connections(odr, table, find_connections(table, successors, plans, sides))
+        nodes = find_nodes(odr, table, found, gaps, crosswalks, sides)
+        on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
+        builder = _NetworkBuilder(odr, table, found, nodes, on_foot, stops, lefthand=lefthand)
+        if stops or not builder.control.standing:
+            break
+        # Lights that stand on plain roads are known now: once more, with the roads cut for them.
+        stops, gaps = cut_for_lights(odr, builder.control.standing, gaps)
+        if not stops:
+            break
     net = builder.net()
     lanes = build_table(net, table, builder.laid(), on_foot, nodes.xodr)
     entries, figures = findings(odr, table, net, lanes, found, builder.control, crosswalks)
@@ -302,10 +314,12 @@ class _NetworkBuilder:
         found: PlannedConnections,
         nodes: Nodes,
         walks: WalkNet,
+        stops: Mapping[Acting, RoadStop],
         *,
         lefthand: bool,
     ) -> None:
         self._odr = odr
+        self._stops = stops
         self._table = table
         self._edges = found.edges
         self._connections = found.connections
@@ -348,6 +362,7 @@ class _NetworkBuilder:
         for walk in walks.lanes:
             self._walked.setdefault(walk.edge.end, []).append(walk.edge.lanes[0].id)
         self.control = self._signal_control()
+        self._walk_lights = self._place_walk_lights()
         self._via: dict[int, NetLane] = {}
         self._beyond: dict[int, tuple[NetLane, float]] = {}
 
@@ -434,7 +449,30 @@ class _NetworkBuilder:
             self._controllers,
             self._lefthand,
             " ".join(junctions),
+            self._find_walk_signals(name) if crossings and not junctions else (),
         )
+
+    def _find_walk_signals(self, name: str) -> tuple[str, ...]:
+        """Ids of the pedestrian lights at the crosswalks of a plain road."""
+        axes = [c.walkway.axis[:, :2] for c in self._walks.crossings.get(name, ())]
+        line = shapely.MultiLineString(axes)
+        return tuple(
+            signal
+            for signal, (x, y) in self._walk_lights.items()
+            if line.distance(shapely.Point(x, y)) <= CROSSING_REACH
+        )
+
+    def _place_walk_lights(self) -> dict[str, tuple[float, float]]:
+        """Where the pedestrian lights of roads outside junctions are, by their ids."""
+        found: dict[str, tuple[float, float]] = {}
+        for road in self._odr.roads.values():
+            row = np.array([self._table.road_index[road.id]])
+            for signal in road.signals if road.junction is None else ():
+                if signal_kind(signal) == "pedestrian_light":
+                    at = np.array([signal.s]), np.array([signal.t])
+                    x, y, _ = self._table.points(row, *at)
+                    found[signal.id] = (float(x[0]), float(y[0]))
+        return found
 
     def _build_passage(self, number: int) -> Passage:
         connection, line = self._connections[number], self._connection_lines[number]
@@ -556,7 +594,53 @@ class _NetworkBuilder:
             node = self._nodes.ends[edge]
             return node in self._nodes.xodr or node in crossed
 
-        return signal_control(self._odr, self._table, self._edges, self._connections, is_junction)
+        control = signal_control(
+            self._odr, self._table, self._edges, self._connections, is_junction, self._stops
+        )
+        return self._obey_priority_signs(control)
+
+    def _obey_priority_signs(self, control: SignalControl) -> SignalControl:
+        """Let those give way who come to a junction where others alone have a sign: of priority.
+
+        Where a sign to give way, a light or ``<priority>`` says who waits, that holds. A sign on
+        one approach is for the one straight opposite as well: writers leave that out.
+        """
+        signs, acting = list(control.signs), []
+        approaches: dict[str, set[int]] = {}
+        for _, controlled in control.favoured:
+            for number in controlled:
+                source = self._connections[number].source
+                approaches.setdefault(self._nodes.ends[source], set()).add(source)
+        for node, favoured in approaches.items():
+            numbers = self._by_node[node]
+            junctions = [self._odr.junctions[name] for name in self._nodes.xodr.get(node, ())]
+            settled = any(control.signs[n] or control.lights[n] for n in numbers)
+            if settled or not junctions or any(junction.priorities for junction in junctions):
+                continue
+            first = favoured
+            if len(favoured) == 1:
+                first = favoured | self._find_opposite_edges(next(iter(favoured)), numbers)
+            waiting = [n for n in numbers if self._connections[n].source not in first]
+            for number in waiting:
+                signs[number] = Sign.YIELD
+            if waiting:
+                acting.append(node)
+        kept = tuple(
+            (element, numbers)
+            for element, numbers in control.favoured
+            if any(self._nodes.ends[self._connections[n].source] in acting for n in numbers)
+        )
+        return control._replace(signs=tuple(signs), favoured=kept)
+
+    def _find_opposite_edges(self, edge: int, numbers: Sequence[int]) -> set[int]:
+        """Edges that come to a junction straight towards another one."""
+        own = self._lane_lines[edge][0].headings()[1]
+        others = {self._connections[n].source for n in numbers} - {edge}
+        return {
+            other
+            for other in others
+            if abs(wrapped(self._lane_lines[other][0].headings()[1] - own)) > OPPOSING
+        }
 
     # Persons
 

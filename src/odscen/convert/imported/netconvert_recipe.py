@@ -21,7 +21,7 @@ _NO_CAR = (
 _MOTORWAY_TYPES = frozenset({"onRamp", "offRamp", "connectingRamp", "mwyEntry", "mwyExit", "HOV"})
 _RESERVED = {"bus": "bus coach emergency", "taxi": "taxi emergency"}
 _CLOSED_TYPES = frozenset(
-    {"none", "shoulder", "border", "median", "curb", "stop", "restricted", "parking", "shared"}
+    {"none", "shoulder", "border", "median", "curb", "stop", "restricted", "parking"}
     | {"bidirectional", "special1", "special2", "special3", "roadWorks", "tram", "rail"}
 )
 

@@ -14,7 +14,9 @@ import numpy as np
 
 from odscen.base.shown import shown_id
 from odscen.convert.model.right_of_way import Sign, wrapped
+from odscen.convert.signals.road_lights import REACH, RoadLights
 from odscen.opendrive.objects import signal_kind
+from odscen.opendrive.sign_catalogue import sign_meaning
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.connections import PlannedConnection
     from odscen.convert.model.edge_plan import EdgePlan
     from odscen.convert.model.lane_alignment import LaneAlignment
+    from odscen.convert.signals.road_lights import RoadStop, StandingLight
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive, Signal, SignalReference, Validity
 
@@ -232,9 +235,6 @@ def _facing_away(
     return frozenset(place for place, look in looks.items() if look <= 0)
 
 
-REACH = 80.0
-"""Metres ahead of a signal on a road within which the junction that it controls must come."""
-
 BEHIND = 5.0
 """Metres past the end of an edge where its signals may be, as beyond a stop line."""
 
@@ -248,13 +248,18 @@ class SignalControl(NamedTuple):
     """What controls each connection: ids of traffic lights, and the strongest sign.
 
     ``unplaced`` are signals that control nothing, with the reason; ``guessed`` are those that do
-    not control what the file says, but what it must mean.
+    not control what the file says, but what it must mean. ``standing`` are the lights that need
+    a place of their own, ``stops`` the elements of those that have one. ``favoured`` are
+    the connections of priority signs, by the elements of these.
     """
 
     lights: tuple[tuple[str, ...], ...]
     signs: tuple[Sign, ...]
     unplaced: tuple[tuple[str, str], ...]
     guessed: tuple[tuple[str, str], ...]
+    standing: tuple[StandingLight, ...] = ()
+    stops: frozenset[str] = frozenset()
+    favoured: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
 
 def acting(odr: OpenDrive) -> Iterator[Acting]:
@@ -277,12 +282,23 @@ def acting(odr: OpenDrive) -> Iterator[Acting]:
                 yield Acting(one.id, element, kind, road.id, one.s, one.orientation, one.validities)
 
 
+def _priority_places(odr: OpenDrive) -> Iterator[Acting]:
+    """Places of the signs that give priority at the next junction."""
+    for road in odr.roads.values():
+        for one in road.signals:
+            if sign_meaning(one) == "priority":
+                element = f"road {shown_id(road.id)} > signal {shown_id(one.id)}"
+                facing = one.orientation, one.validities
+                yield Acting(one.id, element, "priority", road.id, one.s, *facing)
+
+
 def signal_control(
     odr: OpenDrive,
     table: RoadTable,
     edges: Sequence[EdgePlan],
     connections: Sequence[PlannedConnection],
     is_junction: Callable[[int], bool],
+    stops: Mapping[Acting, RoadStop] | None = None,
 ) -> SignalControl:
     """Relate signals and signs to connections.
 
@@ -293,10 +309,14 @@ def signal_control(
     is_junction
         Whether an edge (its position) ends at a place where traffic meets, and not only where the
         lanes of one road change.
+    stops
+        Places that roads have been cut for, by the lights that need them.
     """
     reach = _SignalReach(odr, table, edges, connections, is_junction)
     homes = signal_homes(odr, [reach.junctions(number) for number in range(len(connections))])
     settled = settle_signals(list(acting(odr)), reach, homes)
+    on_roads = RoadLights(odr, table, edges, connections, is_junction, reach)
+    settled, standing = on_roads.settle(settled, stops or {})
     lights: list[dict[str, None]] = [{} for _ in connections]
     signs = [Sign.NONE for _ in connections]
     for place, numbers, _ in settled:
@@ -313,7 +333,13 @@ def signal_control(
     ]
     guessed = {signal.place.element: signal.guess for signal in settled if signal.guess}
     return SignalControl(
-        tuple(tuple(own) for own in lights), tuple(signs), tuple(unplaced), tuple(guessed.items())
+        tuple(tuple(own) for own in lights),
+        tuple(signs),
+        tuple(unplaced),
+        tuple(guessed.items()),
+        tuple(standing),
+        frozenset(place.element for place in stops or {}) & placed,
+        tuple((place.element, tuple(reach.controls(place))) for place in _priority_places(odr)),
     )
 
 

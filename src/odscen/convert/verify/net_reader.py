@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
 
 
-MOTOR_CLASSES = ("passenger", "bus", "taxi", "hov")
+MOTOR_CLASSES = (
+    *("passenger", "bus", "taxi", "hov", "truck", "trailer", "delivery", "motorcycle"),
+    "emergency",
+)
 """A lane open to one of these is a driving lane."""
 
 

@@ -24,6 +24,7 @@ from odscen.maps.importers.base import ImportSettings
 from odscen.maps.importers.registry import map_importers
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import is_outdated
+from odscen.maps.traffic_losses import traffic_losses
 from odscen.scenario.demand.day_profiles import BUILT_IN
 from odscen.web.jobs import JobResult
 from odscen.web.messages import (
@@ -298,6 +299,7 @@ def _rebuild_or_report(shared: Shared, entry: MapEntry) -> MapInfo | BrokenMapIn
 
 def _map_info(entry: MapEntry) -> MapInfo:
     info = entry.info
+    losses = traffic_losses(info["report"])
     return MapInfo(
         name=entry.name,
         sha256=entry.sha256,
@@ -309,6 +311,8 @@ def _map_info(entry: MapEntry) -> MapInfo:
         sumo=NetCounts.model_validate(info["sumo"]),
         network=NetworkOrigin(converter=entry.converter, source=info["network"]["source"]),
         report_counts=info["report"]["counts"],
+        lost=dict(losses.lost),
+        guessed=dict(losses.guessed),
         preview=f"/api/maps/{entry.name}/preview.svg",
         outdated=is_outdated(entry),
     )

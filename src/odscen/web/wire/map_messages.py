@@ -13,6 +13,7 @@ from odscen.base.arrays import Bounds
 from odscen.convert.model.conversion_report import ElementOutcome
 from odscen.convert.model.conversion_settings import ConverterName
 from odscen.lanegraph.map_statistics import MapStatistics
+from odscen.maps.traffic_losses import LossKind
 from odscen.opendrive.objects import SignalKind
 from odscen.web.messages import Answer, OptionInfo
 
@@ -71,6 +72,7 @@ class ImporterInfo(Answer):
 class MapInfo(Answer):
     """A map of the catalogue; ``report_counts`` says how many elements had which outcome.
 
+    ``lost`` and ``guessed`` count what matters for traffic.
     ``importer`` has read its file ``source``: ``opendrive``, or that of another format.
 
     An ``outdated`` one was built by an earlier odscen, and is rebuilt when it is first opened.
@@ -86,6 +88,8 @@ class MapInfo(Answer):
     sumo: NetCounts
     network: NetworkOrigin
     report_counts: dict[ElementOutcome, int]
+    lost: dict[LossKind, int]
+    guessed: dict[LossKind, int]
     preview: str
     outdated: bool
 
