@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from odscen.carla.mirror.actor_mirror import Mirror
 from odscen.carla.mirror.cosim_options import CosimOptions
+from odscen.carla.mirror.mirrored import Mirror
 from odscen.carla.mirror.wheels import Wheels
 from odscen.carla.server.batch import ROLE
 from odscen.carla.server.blueprints import choose_blueprints

@@ -53,7 +53,7 @@ def _compare(carla: object, path: Path, town: str) -> None:
 
 
 def _lane_graph(data: bytes) -> int:
-    from odscen.lanegraph.lane_edges import connect
+    from odscen.lanegraph.build_graphs import connect
     from odscen.lanegraph.lane_nodes import place_nodes
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.parse import parse

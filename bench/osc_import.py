@@ -26,7 +26,7 @@ from odscen.base.xml_reading import read_xml
 from odscen.maps.store import Workspace
 
 if TYPE_CHECKING:
-    from odscen.formats.openscenario_import.xosc_reader import EgoDriver
+    from odscen.formats.openscenario_import.xosc_file import EgoDriver
 
 SHARED = Path(__file__).parents[2] / "shared"
 VERDICTS = ("taken", "approximated", "ignored", "refused")

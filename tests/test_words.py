@@ -66,6 +66,7 @@ ALLOWED = re.compile(
     r"right[- ]of[- ]way|(give|gives|giving|gave) way|(one|two|three|either|half)[- ]?way|all-way"
     r"|(both|either|other|same|this|that|no|only|easy|each|some|best|usual|long|under|two|three"
     r"|all the|out of the|on (the|its|their)|by the|in the|in a|in this) ways?"
+    r"|OSM ways?|^way $"  # the word of OpenStreetMap
     r"|ways? (around|in|of|to)\b(?! (the|a) goal)|of course"
     r"|\"fate\"|entry\.fate",  # a field of map.json
     re.IGNORECASE,

@@ -20,7 +20,7 @@ from typing import Any
 
 import msgpack
 
-from odscen.carla.server.protocol_transcript import FrameKind, ProtocolFrame, parse_transcript
+from odscen.carla.server.recording_proxy import FrameKind, ProtocolFrame, parse_transcript
 from tests.carla_standin import wire
 from tests.carla_standin.__main__ import say
 from tests.carla_standin.protocol_difference import call_differences

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from odscen.base.errors import InputError
-from odscen.lanegraph import path_finder
+from odscen.lanegraph import shortest_paths
 from odscen.lanegraph.graph_files import to_networkx
 from odscen.lanegraph.graphs import MapGraph
 from odscen.lanegraph.query import induced, node_id, node_ids, node_index, walk_node_id
@@ -161,7 +161,7 @@ def test_a_candidate_is_what_the_list_of_candidates_holds(kind: type, graph: Map
 def test_candidates_of_many_are_those_of_each(
     kind: type, graph: MapGraph, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(path_finder, "_MANY", 0)
+    monkeypatch.setattr(shortest_paths, "_MANY", 0)
     router = kind(graph)
     spawns = range(0, len(router.mask), 7)
     found = [[*map(int, goals)] for goals in router.each_candidates([*spawns])]
@@ -178,7 +178,7 @@ def test_candidates_of_many_are_those_of_each(
 
 
 def test_of_many_one_outside_the_region_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(path_finder, "_MANY", 0)
+    monkeypatch.setattr(shortest_paths, "_MANY", 0)
     router = Router(FORK, induced(FORK, ["r2"]).nodes)
     with pytest.raises(InputError, match=r"node 1\.0\.-1\.0 is outside the region"):
         list(router.each_candidates([0]))
@@ -192,7 +192,7 @@ def test_on_a_closed_town_goals_of_many_are_those_of_each(monkeypatch: pytest.Mo
         pairs += [(spawn, node) for goal in goals for node in (goal, goal - 1)]
     expected = [router.is_candidate(*pair) for pair in pairs]
     assert 0 < sum(expected) < len(expected)
-    monkeypatch.setattr(path_finder, "_MANY", 0)
+    monkeypatch.setattr(shortest_paths, "_MANY", 0)
     assert router.are_candidates(*zip(*pairs, strict=True)) == expected
 
 

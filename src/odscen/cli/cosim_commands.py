@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from odscen.base.errors import InputError
+from odscen.base.text_files import write_text
 from odscen.cli.console import (
     BehaviourCommandOption,
     BehaviourOption,
@@ -24,7 +26,6 @@ from odscen.cli.console import (
     print_table,
     progress,
 )
-from odscen.cli.cosim_selfcheck import run_selfcheck
 from odscen.records.outcomes import RunStatus
 from odscen.runs.reporter import Reporter
 
@@ -35,11 +36,51 @@ if TYPE_CHECKING:
     from odscen.carla.mirror.foreign_actors import ForeignRoles
     from odscen.carla.native.native_run import NativeOptions
     from odscen.carla.sensors.sensor_file import SensorWish
+    from odscen.carla.server.client import Address
     from odscen.runs.finished_run import Run
     from odscen.runs.reporter import Progress
     from odscen.runs.run_settings import RunSettings
 
 
+# ------------------------------------------------------------------------- odscen cosim --selfcheck
+def run_selfcheck(
+    address: Address,
+    scenario: Path | None,
+    *,
+    out: Path | None,
+    workspace: Path | None,
+    as_json: bool,
+) -> NoReturn:
+    """Check a server, write the page and its data, and exit.
+
+    Raises
+    ------
+    WorkspaceError
+        If the files cannot be written.
+    """
+    from odscen.carla.selfcheck.selfcheck_page import DATA, PAGE, selfcheck_data, selfcheck_page
+    from odscen.carla.selfcheck.selfcheck_run import selfcheck
+    from odscen.carla.server.interruption import INTERRUPTED
+    from odscen.maps.store import Workspace
+
+    with progress("checking") as step:
+        report = selfcheck(Workspace.open(workspace), address, scenario=scenario, notify=step)
+    folder = out or Path()
+    data = selfcheck_data(report)
+    write_text(folder / PAGE, selfcheck_page(report))
+    write_text(folder / DATA, json.dumps(data, indent=1) + "\n")
+    if as_json:
+        print_json({**data, "files": {"page": str(folder / PAGE), "data": str(folder / DATA)}})
+    else:
+        rows = [(line.name, line.expected, line.seen, str(line.state)) for line in report.lines]
+        print_table("", ("check", "expected", "seen", "result"), rows)
+    log(f"Page: {folder / PAGE}")
+    if report.interrupted:
+        raise typer.Exit(INTERRUPTED)
+    raise typer.Exit(1 if report.differing else 0)
+
+
+# ----------------------------------------------------------------------------- odscen cosim
 class Ego(StrEnum):
     """Who drives the ego."""
 

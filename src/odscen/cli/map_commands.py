@@ -76,6 +76,13 @@ def add(
         list[str] | None,
         typer.Option(help="A setting of the importer; repeatable.", metavar="NAME=VALUE"),
     ] = None,
+    box: Annotated[
+        str | None,
+        typer.Option(
+            help="Part of an OpenStreetMap file, in degrees; as --option box=W,S,E,N.",
+            metavar="W,S,E,N",
+        ),
+    ] = None,
     memory: BuildMemoryOption = None,
     minutes: BuildMinutesOption = None,
     workspace: WorkspaceOption = None,
@@ -96,7 +103,8 @@ def add(
     if name is not None and len(files) > 1:
         raise InputError(f"--name takes one file, {len(files)} are given")
     limits = BuildLimits(memory, minutes)
-    importing = ImportSettings(importer, option_settings(option or (), element="--option"))
+    options = option_settings(option or (), element="--option")
+    importing = ImportSettings(importer, options if box is None else {**options, "box": box})
     store = Workspace.open(workspace)
     rows: list[dict[str, Any]] = []
     worst = 0

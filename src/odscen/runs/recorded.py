@@ -119,7 +119,7 @@ def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:
 def read_lanes(run: Path) -> pl.DataFrame | None:
     """Read what was measured on each lane and interval, sorted by ``begin`` and ``lane``.
 
-    Columns as in :mod:`odscen.sumo.outputs.lane_measures`.
+    Columns as in :mod:`odscen.sumo.outputs.output_tables`.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def read_lane_segments(run: Path) -> pl.DataFrame | None:
 def read_trips(run: Path) -> pl.DataFrame | None:
     """Read the trips of vehicles and persons in order of arrival, the unfinished last.
 
-    Columns as in :mod:`odscen.sumo.outputs.trip_table`.
+    Columns as in :mod:`odscen.sumo.outputs.output_tables`.
 
     Returns
     -------
@@ -198,7 +198,7 @@ def read_calls(run: Path) -> pl.DataFrame | None:
 
 
 def read_visits(run: Path) -> pl.DataFrame | None:
-    """Read who was at which stop when: columns of :mod:`odscen.sumo.outputs.stop_table`.
+    """Read who was at which stop when: columns of :mod:`odscen.sumo.outputs.output_tables`.
 
     Returns
     -------
@@ -212,8 +212,8 @@ def read_stays(run: Path) -> pl.DataFrame | None:
 
     Returns
     -------
-    Columns of :func:`odscen.sumo.outputs.stop_table.stay_table`, in order of arrival; ``None`` if
-    no trip of the scenario parks.
+    Columns of :func:`odscen.sumo.outputs.output_tables.stay_table`, in order of arrival;
+    ``None`` if no trip of the scenario parks.
     """
     stays = _read_recorded(run, STAYS_FILE)
     return None if stays is None else stays.sort("arrival", "actor")

@@ -199,7 +199,7 @@ class PositionRecord:
         return Trip(loss, trip.waiting, None if walks else trip.halts)
 
     def _write_trips(self, trips: dict[str, Trip], file: Path) -> None:
-        """Write the table of trips, columns as of :mod:`odscen.sumo.outputs.trip_table`."""
+        """Write the table of trips, columns as of :mod:`odscen.sumo.outputs.output_tables`."""
         import polars as pl
 
         rows = []

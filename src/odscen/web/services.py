@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -15,12 +16,12 @@ from starlette.requests import HTTPConnection
 
 from odscen.app.maps import LoadedMap, map_of
 from odscen.base.errors import ConflictError
+from odscen.carla.served.served_run import probe
 from odscen.maps.guarded_build import read_scenario_in_child
 from odscen.maps.store import Workspace
 from odscen.scenario.forms.any_form import read_any
 from odscen.scenario.placing.region import Region
 from odscen.web.active_runs import Runs
-from odscen.web.carla_status import CarlaServer
 from odscen.web.drafts import Drafts
 from odscen.web.jobs import Jobs
 from odscen.web.large.large_documents import LARGE, LargeDocuments
@@ -28,9 +29,38 @@ from odscen.web.studies.active_studies import Studies
 from odscen.web.sweeps.active_sweeps import Sweeps
 
 if TYPE_CHECKING:
+    from odscen.carla.served.served_run import ServerCheck
     from odscen.carla.server.client import Address
     from odscen.scenario.document.scenario_document import Scenario
 
+
+# ---------------------------------------------------------- what the server knows of a CARLA server
+FRESH = 10.0
+"""Wall seconds that an answer is good for, while the port is as it was."""
+
+
+class CarlaServer:
+    """The CARLA server at one address, there or not."""
+
+    def __init__(self, address: Address) -> None:
+        self.address = address
+        self._lock = threading.Lock()
+        self._found: ServerCheck | None = None
+        self._listened = False
+        self._when = 0.0
+
+    def look(self) -> ServerCheck:
+        """See whether it is there; may take some seconds when it has just come."""
+        with self._lock:
+            stale = time.monotonic() - self._when > FRESH
+            listens = self.address.listens()
+            if self._found is None or stale or listens != self._listened:
+                self._found, self._listened = probe(self.address), listens
+                self._when = time.monotonic()
+            return self._found
+
+
+# ---------------------------------------------------------------------------- what the routes share
 _WAIT = 5.0
 """Seconds that an upload waits for others to be read."""
 

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from odscen.app.learned.steady_traffic import stopped_growth
+from odscen.app.learned.snapshot_data import stopped_growth
 
 
 def growth(rows: pl.DataFrame) -> float:

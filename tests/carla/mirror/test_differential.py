@@ -141,7 +141,7 @@ def shown(
     server: Any, stand_in: Any, blueprint: str, category: str, places: list[tuple[float, ...]]
 ) -> list[Command]:
     """Commands by which the mirror shows road users at places: x, y, z, hdg, pitch, speed."""
-    from odscen.carla.mirror.actor_mirror import Mirror
+    from odscen.carla.mirror.mirrored import Mirror
     from odscen.records.run_plan import Plan, PlannedActor
     from odscen.sumo.runner.in_step import Step
 

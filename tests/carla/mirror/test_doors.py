@@ -12,7 +12,7 @@ import pytest
 
 from odscen.carla.mirror.cosim import cosim
 from odscen.carla.mirror.cosim_options import CosimOptions
-from odscen.carla.mirror.doors import Doors
+from odscen.carla.mirror.mirrored import Doors
 from odscen.carla.server.batch import DoorMove
 from odscen.carla.server.client import Address
 from odscen.maps.store import Workspace

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from odscen.base.errors import CarlaError, InputError
-from odscen.carla.mirror.actor_mirror import Mirror, between
 from odscen.carla.mirror.cosim_options import CosimOptions
+from odscen.carla.mirror.mirrored import Mirror, between
 from odscen.carla.mirror.nearby import HYSTERESIS, Nearby
 from odscen.carla.server.batch import BRAKE, FOG, LEFT, LIFTS, LOW_BEAM, POSITION, RIGHT, Batch
 from odscen.carla.server.blueprints import Shape, choose_blueprints

@@ -17,7 +17,7 @@ from odscen.carla.mirror.cosim import cosim
 from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.server.client import Address
 from odscen.carla.server.protocol_recording import recorded_protocol
-from odscen.carla.server.protocol_transcript import (
+from odscen.carla.server.recording_proxy import (
     FrameKind,
     frame_line,
     header_line,

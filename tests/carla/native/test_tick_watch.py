@@ -18,7 +18,7 @@ import pytest
 
 from odscen.carla.native import native_run
 from odscen.carla.native.native_run import NativeOptions, run_native
-from odscen.carla.native.tick_watch import TickWatch, free
+from odscen.carla.native.native_traffic import TickWatch, free
 from odscen.carla.server.client import Address
 from tests.carla.conftest import MAPS, Sample
 from tests.carla_standin.process import StandIn
@@ -36,7 +36,7 @@ CROSSING = MAPS / "signal_crossing.xodr"
 UNTIL_FREED = """
 import json, os, socket, sys, time
 from pathlib import Path
-from odscen.carla.native.tick_watch import TickWatch
+from odscen.carla.native.native_traffic import TickWatch
 from tests.carla_standin.conftest import connect, synchronize
 from tests.carla_standin.process import StandIn
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csgraph, csr_matrix
 
-from odscen.lanegraph import path_finder
+from odscen.lanegraph import shortest_paths
 from odscen.lanegraph.searches.blocks import Blocks
 from odscen.lanegraph.searches.corridor_paths import CorridorPaths
 from odscen.lanegraph.searches.edge_matrix import shortest_edges
@@ -94,8 +94,8 @@ def test_on_a_map_paths_and_distances_are_those_in_the_tree_of_the_source(
     trees, router = kind(graph), kind(graph)
     pairs = np.random.default_rng(1).integers(0, len(trees.nodes), (60, 2)).tolist()
     expected = [(trees.distance(*pair), trees.path(*pair).tolist()) for pair in pairs]
-    monkeypatch.setattr(path_finder, "_LARGE", 0)
-    monkeypatch.setattr(path_finder, "_TREES", 0)
+    monkeypatch.setattr(shortest_paths, "_LARGE", 0)
+    monkeypatch.setattr(shortest_paths, "_TREES", 0)
     found = [(router.distance(*pair), router.path(*pair).tolist()) for pair in pairs]
     assert found == expected
     assert router._corridor_paths is not None
@@ -106,8 +106,8 @@ def test_on_a_map_paths_and_distances_are_those_in_the_tree_of_the_source(
 def test_of_many_goals_of_one_source_a_tree_has_all(monkeypatch: pytest.MonkeyPatch) -> None:
     graph = shipped("roundabout")
     expected = [Router(graph).distance(0, node) for node in range(0, 400, 10)]
-    monkeypatch.setattr(path_finder, "_LARGE", 0)
-    monkeypatch.setattr(path_finder, "_TREES", 0)
+    monkeypatch.setattr(shortest_paths, "_LARGE", 0)
+    monkeypatch.setattr(shortest_paths, "_TREES", 0)
     router = Router(graph)
     assert [router.distance(0, node) for node in range(0, 400, 10)] == expected
     assert router._searched == 1

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csgraph, csr_matrix
 
-from odscen.lanegraph import path_finder
+from odscen.lanegraph import shortest_paths
 from odscen.lanegraph.searches.blocks import Blocks
 from odscen.lanegraph.searches.connected_parts import ConnectedParts
 from odscen.lanegraph.searches.edge_matrix import shortest_edges
@@ -100,7 +100,7 @@ def test_on_a_closed_town_goals_are_those_of_each_start(
     allowed = rng.random(len(alone.mask)) < 0.97
     expected = [(found := alone.goal_candidates(spawn))[allowed[found]] for spawn in spawns]
     assert min(map(len, expected)) > 0
-    monkeypatch.setattr(path_finder, "_MANY", 0)
+    monkeypatch.setattr(shortest_paths, "_MANY", 0)
     found = list(router.each_candidates(spawns, lambda _: allowed))
     assert [len(goals) for goals in found] == [len(goals) for goals in expected]
     for goals, known in zip(found, expected, strict=True):

@@ -16,8 +16,8 @@ from odscen.maps.importers.opendrive import OpenDriveImporter
         (gzip.compress(b"<osm/>"), "a.osm.gz", "a gzip archive", "unpack it"),
         (b"PK\x03\x04...", "a.zip", "a zip archive", "unpack it"),
         (b"\x0a\x12binary\x00", "a.rrhd", "a RoadRunner file", "export OpenDRIVE from RoadRunner"),
-        (b"\0\0\0\x0d\x0a\x09OSMHeader", "a.pbf", "OpenStreetMap (PBF)", "--osm-files"),
-        (b'<?xml version="1.0"?>\n<osm version="0.6"/>', "a.osm", "OpenStreetMap", "--osm-files"),
+        (b"\0\0\0\x0d\x0a\x09OSMHeader", "a.pbf", "OpenStreetMap (PBF)", "ending .osm.pbf"),
+        (b'<?xml version="1.0"?>\n<osm version="0.6"/>', "a.osm", "OpenStreetMap", "ending .osm "),
         (
             b"<osm>" + b"<node/>" * 20_000 + b"<tag k='type' v='lanelet'/></osm>",
             "a.osm",
@@ -63,7 +63,7 @@ def test_what_is_no_xml_has_no_root_element() -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b'<?xml version="1.0"?><osm version="0.6"/>', "OpenStreetMap, not OpenDRIVE: netconvert"),
+        (b'<?xml version="1.0"?><osm version="0.6"/>', "OpenStreetMap, not OpenDRIVE: give it"),
         (b"<net/>", "a SUMO network, not OpenDRIVE: netconvert makes OpenDRIVE of it"),
         (b"<commonRoad/>", "a CommonRoad scenario, not OpenDRIVE: export its map as OpenDRIVE"),
         (b"\x0a\x12binary\x00\x01", "binary data, not OpenDRIVE: convert it"),

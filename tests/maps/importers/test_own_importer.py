@@ -195,14 +195,15 @@ def test_a_package_that_cannot_be_imported_hides_no_other(installed: Path) -> No
     (installed / "my_maps.py").write_text("import nowhere")
     own_importer.forget()
     importers = map_importers()
-    assert list(importers.usable) == ["opendrive", "lanelet2"]
+    assert "road" not in importers.usable
     assert importers.broken == {"road": "No module named 'nowhere'"}
     with pytest.raises(InputError, match=r"seems to be text: .*'road' cannot be used: No module"):
         importer_for(PLACE, "place.road")
 
 
 def test_opendrive_is_an_entry_of_the_list_and_is_asked_first() -> None:
-    assert list(map_importers().usable) == ["opendrive", "lanelet2", "road"]
+    names = list(map_importers().usable)
+    assert (names[0], names[-1]) == ("opendrive", "road")
     assert importer_for(b"<OpenDRIVE/>", "town.xml").name == "opendrive"
     assert importer_for(b"<OpenDRIVE/>", "town.road").name == "opendrive"
     assert importer_for(b"anything", "town.XODR").name == "opendrive"
@@ -213,9 +214,9 @@ def test_opendrive_is_an_entry_of_the_list_and_is_asked_first() -> None:
 def test_a_file_that_no_importer_takes_says_what_it_seems_to_be(
     store: Workspace, tmp_path: Path
 ) -> None:
-    (tmp_path / "town.osm").write_text("<osm/>")
-    with pytest.raises(InputError, match=r"^town\.osm: no importer takes this file; it seems"):
-        store.add_map(tmp_path / "town.osm")
+    (tmp_path / "town.kml").write_text("<kml/>")
+    with pytest.raises(InputError, match=r"^town\.kml: no importer takes this file; it seems"):
+        store.add_map(tmp_path / "town.kml")
 
 
 @pytest.mark.slow
@@ -239,7 +240,8 @@ def test_the_command_line_takes_it(place: Path, tmp_path: Path) -> None:
     shown = odscen_maps("show", "place", "--workspace", root)
     assert shown["import"]["options"] == {"lane_width": 3.0}  # type: ignore[index]
     listed = odscen_maps("importers")
-    assert [row["name"] for row in listed["importers"]] == ["opendrive", "road"]  # type: ignore[attr-defined]
+    names = [row["name"] for row in listed["importers"]]  # type: ignore[attr-defined]
+    assert (names[0], names[-1]) == ("opendrive", "road")
 
 
 @pytest.mark.slow

@@ -38,8 +38,7 @@ from odscen.figures.measures.registry import figure_values
 from odscen.records.run_plan import PlannedStation, StationKind
 from odscen.runs import layout
 from odscen.runs.net_facts import read_net_facts
-from odscen.sumo.outputs.lane_measures import lane_table
-from odscen.sumo.outputs.trip_table import trip_table
+from odscen.sumo.outputs.output_tables import lane_table, trip_table
 from odscen.sumo.realize.measure_files import measures_xml
 from odscen.sumo.realize.sumo_lane_places import lane_places
 from tests.sumo.conftest import BIN

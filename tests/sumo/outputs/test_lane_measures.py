@@ -4,7 +4,7 @@ from pathlib import Path
 
 import polars as pl
 
-from odscen.sumo.outputs.lane_measures import lane_table
+from odscen.sumo.outputs.output_tables import lane_table
 
 MEASURES = (
     "sampledSeconds", "traveltime", "density", "waitingTime", "timeLoss", "speed",

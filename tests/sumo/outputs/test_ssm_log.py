@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.sumo.outputs.ssm_log import logged_conflicts
+from odscen.sumo.outputs.conflict_files import logged_conflicts
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,7 +13,7 @@ from lxml import etree
 
 from odscen.figures.measures.summary import actors_from_json
 from odscen.runs.recorded import read_lanes, read_trajectories, read_trips
-from odscen.sumo.outputs.lane_measures import lane_table
+from odscen.sumo.outputs.output_tables import lane_table
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
 from odscen.sumo.realize.sumocfg import SumocfgSettings, sumo_config
 from odscen.sumo.runner.run_folder import SumoPreparedRun

@@ -14,9 +14,13 @@ from odscen.app.learned.evaluated_scenes import (
     scene_of_scenario,
     scenes_of,
 )
-from odscen.app.learned.first_seconds import HARD, first_seconds
 from odscen.app.learned.learned_maps import examples_of, whole_map
+from odscen.app.learned.snapshot_data import BRAKING_SECONDS, braking_of
+from odscen.app.running.batches import run_all
+from odscen.app.running.runs import check_run
 from odscen.app.scenarios import read_scenario, scenario_files
+from odscen.base.atomic_folders import scratch_folder
+from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.learning.fill import VEHICLES, Fill, checked_fill
 from odscen.learning.reference.model_training import placed
@@ -32,6 +36,8 @@ from odscen.learning.traffic_metrics import (
     together,
 )
 from odscen.learning.traffic_snapshots import no_lights
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.distributions import stream
 from odscen.sumo.realize.signals_ahead import lights_at_start
 
@@ -48,6 +54,68 @@ if TYPE_CHECKING:
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Actor, Scenario
 
+
+# ------------------------ what SUMO does with generated traffic in its first two seconds, above all
+HARD = 4.0
+"""m/s²; a vehicle that brakes harder brakes hard. SUMO's cars brake with up to 4.5 as a habit."""
+STEP = 0.5
+
+
+class FirstSeconds(NamedTuple):
+    """What became of the vehicles of one scenario.
+
+    ``braking`` is the strongest deceleration of each that came onto the road, m/s²; ``collided``
+    and ``inserted`` are shares of those planned.
+    """
+
+    braking: FloatArray
+    collided: float
+    inserted: float
+
+
+def first_seconds(workspace: Workspace, scenarios: Sequence[Scenario]) -> list[FirstSeconds]:
+    """Run scenarios for two seconds.
+
+    Raises
+    ------
+    ScenarioError
+        With every error of a scenario.
+    InputError
+        If a run fails.
+    """
+    with scratch_folder() as folder:
+        settings = RunSettings(
+            until=BRAKING_SECONDS + STEP,
+            step_length=STEP,
+            warm_up=0.0,
+            recording=Recording(emissions=False),
+        )
+        checked = [
+            check_run(workspace, one, name=f"{place:03d}", out=folder, settings=settings)
+            for place, one in enumerate(scenarios)
+        ]
+        found = []
+        for run in run_all(checked, reports=False, figures=False):
+            if run.exit_code == 3:
+                raise InputError(
+                    f"the run has failed: {run.known.get('error')}", file=run.known.get("scenario")
+                )
+            rows = run.trajectories()
+            rows = rows.filter(rows["category"] != str(Category.PEDESTRIAN))
+            first = rows.filter(rows["time"] < STEP / 2.0)["id"].to_list()
+            planned = max(run.counts["planned"], 1)
+            braking = braking_of(rows, 0.0, first)
+            found.append(
+                FirstSeconds(
+                    braking[~np.isnan(braking)],
+                    run.counts["collided"] / planned,
+                    run.counts["inserted"] / planned,
+                )
+            )
+    return found
+
+
+# ----------------------- how good generated traffic is, map by map, beside baselines and SUMO's own
 FLOOR, REFERENCE, BINNED, RANDOM = "SUMO", "reference", "binned statistics", "random fill"
 NEAR = 1
 """Nodes: a vehicle nearer to one of a known snapshot is no new one."""

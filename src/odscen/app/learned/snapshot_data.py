@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from odscen.app.learned.steady_traffic import most_stopped, stopped_growth
 from odscen.app.maps import load_map
 from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
@@ -25,6 +24,7 @@ from odscen.base.version import __version__
 from odscen.learning.reference.gap_states import seen_ahead
 from odscen.learning.reference.road_strips import road_strips
 from odscen.learning.traffic_snapshots import (
+    STOPPED,
     Shard,
     Snapshot,
     shard_bytes,
@@ -56,6 +56,44 @@ if TYPE_CHECKING:
     from odscen.runs.finished_run import Run
     from odscen.sumo.realize.signals_ahead import LightLog
 
+
+# ------------------------------------------------ whether the traffic of a run is in a steady state
+FEW = 30
+"""Vehicles, of which one light may stop most."""
+
+
+def stopped_growth(rows: pl.DataFrame, *, start: float, middle: float) -> float:
+    """How much the share of stopped vehicles rises: after ``middle``, from ``start`` until then.
+
+    Parameters
+    ----------
+    rows
+        Trajectories of vehicles: ``time`` (s) and ``speed`` (m/s).
+    start, middle
+        Seconds of the run.
+
+    Returns
+    -------
+    float
+        Difference of two shares, -1 to 1; 0 for fewer vehicles than :data:`FEW` in the mean.
+    """
+    rows = rows.filter(rows["time"] >= start)
+    late = rows["time"].to_numpy() >= middle
+    stands = rows["speed"].to_numpy() < STOPPED
+    if late.all() or not late.any() or len(rows) < FEW * rows["time"].n_unique():
+        return 0.0
+    return float(stands[late].mean() - stands[~late].mean())
+
+
+def most_stopped(snapshots: Sequence[Snapshot]) -> float:
+    """Largest share of stopped vehicles; snapshots of few count together."""
+    few = [snapshot.speed for snapshot in snapshots if len(snapshot.speed) < FEW]
+    many = [snapshot.speed for snapshot in snapshots if len(snapshot.speed) >= FEW]
+    groups = [*many, np.concatenate([np.empty(0), *few])]
+    return max((float(np.mean(group < STOPPED)) for group in groups if len(group)), default=0.0)
+
+
+# ------------------------------------------------ snapshots of SUMO's traffic as data to learn from
 SUFFIX = ".shard.npz"
 SKIPPED = ".skipped.json"
 OFF_NODE = 2.5

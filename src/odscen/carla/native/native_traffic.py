@@ -3,29 +3,221 @@
 The Traffic Manager is a part of the client, runs in this process, and ends the process when the
 server does not answer it. So this is the business of a worker process
 (:mod:`odscen.carla.native.native_worker`), which tells of everything as it happens.
+
+Frees a Traffic Manager that waits for its own thread.
+
+In synchronous mode the thread that ticks and the Traffic Manager's own wake each other without
+holding the lock that the other one goes to sleep with (issue 9172 of carla-simulator/carla). Now
+and then one is called a moment before it sleeps: then both sleep, no time-out applies, and the
+tick never ends. Leaving synchronous mode calls the Traffic Manager's thread once more. The thread
+that ticks holds the lock of the client's Traffic Managers meanwhile, so this is asked for at the
+port on which the Traffic Manager listens for other clients.
 """
 
 from __future__ import annotations
 
 import math
 import socket
-from contextlib import suppress
+import threading
+import time
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr
-from odscen.carla.native.spawn_queue import RETRY_SECONDS, SpawnQueue
-from odscen.carla.native.tick_watch import TickWatch
+from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr, xodr_to_carla
+from odscen.carla.server.batch import LIFTS, ROLE
 from odscen.records.run_events import Event, EventKind
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from odscen.carla.native.native_plan import NativeActor
     from odscen.carla.server.carla_server import Server
 
+
+# -------------------------------------------- frees a Traffic Manager that waits for its own thread
+PATIENCE = 2.0
+"""Seconds after the frame has come until a tick that has not ended is taken for one that never
+will: the Traffic Manager's own step takes milliseconds."""
+_LOOK = 0.25
+"""Seconds between two looks."""
+_ANSWER = 2.0
+"""Seconds for an answer of the Traffic Manager."""
+
+
+class TickWatch:
+    """Sees to it that ticks end; looks from a thread of its own until the process ends.
+
+    Parameters
+    ----------
+    port
+        On which the Traffic Manager of this process listens.
+    frame
+        Number of the newest frame that has come from the server.
+
+    Attributes
+    ----------
+    freed
+        How often a tick had to be freed.
+    """
+
+    def __init__(self, port: int, frame: Callable[[], int], *, patience: float = PATIENCE) -> None:
+        self._port = port
+        self._frame = frame
+        self._patience = patience
+        self._before: int | None = None
+        self.freed = 0
+        threading.Thread(target=self._watch_ticks, name="tick-watch", daemon=True).start()
+
+    @contextmanager
+    def tick(self) -> Iterator[None]:
+        """Watch the tick that is made within."""
+        self._before = self._frame()
+        try:
+            yield
+        finally:
+            self._before = None
+
+    def _watch_ticks(self) -> None:
+        watched, since = None, 0.0
+        while True:
+            time.sleep(_LOOK)
+            before = self._before
+            if before is None or self._frame() <= before:
+                watched = None
+            elif before != watched:
+                watched, since = before, time.monotonic()
+            elif time.monotonic() - since >= self._patience:
+                watched = None
+                with suppress(OSError):  # then it is tried again
+                    free(self._port)
+                    self.freed += 1
+
+
+def free(port: int) -> None:
+    """Call the thread of the Traffic Manager that listens on a port of this machine.
+
+    Both requests are sent at once, so that it makes no step of its own between the two.
+
+    Raises
+    ------
+    OSError
+        If it does not answer.
+    """
+    import msgpack
+
+    requests = [
+        msgpack.packb([0, number, "set_synchronous_mode", [on]])
+        for number, on in enumerate((False, True))
+    ]
+    with socket.create_connection(("127.0.0.1", port), timeout=_ANSWER) as line:
+        line.sendall(b"".join(requests))
+        answers = msgpack.Unpacker()
+        got = 0
+        while got < len(requests):
+            part = line.recv(4096)
+            if not part:
+                raise ConnectionError(f"the Traffic Manager at port {port} closed the connection")
+            answers.feed(part)
+            got += sum(1 for _ in answers)
+
+
+# ------------------------------------------------- road users of native mode that are still to come
+RETRY_SECONDS = 0.5
+"""Simulated seconds between two tries to spawn a road user."""
+
+
+@dataclass(slots=True)
+class _SpawnTries:
+    next: float = 0.0
+    count: int = 0
+    reason: str = ""
+
+
+class SpawnQueue:
+    """Road users that are to be spawned, in order of departure.
+
+    Parameters
+    ----------
+    server
+        Synchronized.
+    actors
+        Who is to come.
+    blueprints
+        By row of the plan.
+    """
+
+    def __init__(
+        self, server: Server, actors: Sequence[NativeActor], blueprints: Sequence[str]
+    ) -> None:
+        self._server = server
+        self._blueprints = blueprints
+        self._waiting = sorted(actors, key=lambda actor: (actor.depart, actor.row))
+        self._tries: dict[int, _SpawnTries] = {}
+
+    def __len__(self) -> int:
+        """How many are still to come."""
+        return len(self._waiting)
+
+    @property
+    def most_tries(self) -> int:
+        """How often the one who was refused most often was tried."""
+        return max((tries.count for tries in self._tries.values()), default=0)
+
+    def refusals(self) -> dict[str, str]:
+        """Why the server refused a road user, by id; of those that were not spawned."""
+        return {
+            actor.id: self._tries[actor.row].reason
+            for actor in self._waiting
+            if actor.row in self._tries
+        }
+
+    def spawn_due(self, time: float) -> Iterator[tuple[NativeActor, int]]:
+        """Spawn who is due at ``time``, seconds; yields each with the number of its actor."""
+        due = [
+            actor for actor in self._waiting if actor.depart <= time and self._may_try(actor, time)
+        ]
+        for _ in LIFTS:  # all in this tick: a body on the ground is refused, and one above it taken
+            commands = [self._spawn_command(actor) for actor in due]
+            answers = self._server.spawn(commands) if commands else []
+            refused = []
+            for actor, answer in zip(due, answers, strict=True):
+                if isinstance(answer, int):
+                    self._waiting.remove(actor)
+                    yield actor, answer
+                else:
+                    self._note_refusal(actor, answer, time)
+                    refused.append(actor)
+            due = refused
+
+    def _may_try(self, actor: NativeActor, time: float) -> bool:
+        tries = self._tries.get(actor.row)
+        return tries is None or tries.next <= time
+
+    def _note_refusal(self, actor: NativeActor, reason: str, time: float) -> None:
+        tries = self._tries.setdefault(actor.row, _SpawnTries())
+        tries.next, tries.reason = time + RETRY_SECONDS, reason
+        tries.count += 1
+
+    def _spawn_command(self, actor: NativeActor) -> Any:
+        """At the exact place; only the height gives way, and physics lets a vehicle settle."""
+        tries = self._tries.get(actor.row)
+        lift = LIFTS[tries.count % len(LIFTS)] if tries else LIFTS[0]
+        if actor.person:
+            lift += actor.height / 2.0
+        at = xodr_to_carla(actor.at)
+        return self._server.spawn_command(
+            self._blueprints[actor.row],
+            "hero" if actor.ego else ROLE + actor.id,
+            (float(at.x), float(at.y), float(at.z) + lift),
+            pitch=float(at.pitch_deg),
+            yaw=float(at.yaw_deg),
+        )
+
+
+# -------------------------------------------------------------------------- native mode on a server
 ARRIVED = 2.5
 """Metres from the goal at which a road user has arrived."""
 END_OF_ROAD = 40.0

@@ -11,19 +11,114 @@ from odscen.base.errors import CarlaError
 from odscen.carla.server.batch import ROLE, Batch
 from odscen.carla.server.batch_commands import BatchCommands
 from odscen.carla.server.client import answering, connect
-from odscen.carla.server.part_calls import PartCalls
 from odscen.carla.server.releases import release_of
-from odscen.carla.server.server_lights import LightHold
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from collections.abc import Set as AbstractSet
     from contextlib import AbstractContextManager
     from types import TracebackType
 
-    from odscen.carla.server.batch import Spawn
+    from odscen.carla.server.batch import DoorMove, Spawn, WheelTurn
     from odscen.carla.server.client import Address
 
+
+# ----------------------------------------------- the traffic lights of a server while they are ours
+class LightHold:
+    """Traffic lights that were looked at, and how they were before we took them.
+
+    Its calls raise the client's plain ``RuntimeError``.
+    """
+
+    def __init__(self, carla: Any) -> None:
+        self._carla = carla
+        self._lights: dict[int, Any] = {}
+        self._before: dict[int, Any] = {}
+        self._was_frozen: bool | None = None
+
+    def watch(self, world: Any) -> dict[str, int]:
+        """Look at the lights, which the server switches; actor by OpenDRIVE signal id."""
+        lights = list(world.get_actors().filter("traffic.traffic_light*"))
+        self._lights = {light.id: light for light in lights}
+        return {str(light.get_opendrive_id()): light.id for light in lights}
+
+    def take(self, world: Any) -> dict[str, int]:
+        """Freeze the lights under our control; actor by OpenDRIVE signal id."""
+        joined = self.watch(world)
+        lights = list(self._lights.values())
+        self._before = {light.id: light.get_state() for light in lights}
+        self._was_frozen = bool(lights) and all(light.is_frozen() for light in lights)
+        world.freeze_all_traffic_lights(True)
+        return joined
+
+    def switch(self, states: Mapping[int, str]) -> None:
+        """Set states by actor; no answer is waited for."""
+        for actor, state in states.items():
+            self._lights[actor].set_state(getattr(self._carla.TrafficLightState, state))
+
+    def shown(self) -> dict[int, str]:
+        """State of each light in the newest state of the server, by actor."""
+        return {number: str(light.get_state()) for number, light in self._lights.items()}
+
+    def give_back(self, world: Any) -> None:
+        """Set the lights to what they were before they were taken, if they were."""
+        if self._was_frozen is None:
+            return
+        for actor, state in self._before.items():
+            self._lights[actor].set_state(state)
+        world.freeze_all_traffic_lights(self._was_frozen)
+
+
+# --------------------------------------------------------- wheels and doors of vehicles on a server
+class PartCalls:
+    """Turns wheels, moves doors, and knows the vehicles that have them.
+
+    Its calls raise the client's plain ``RuntimeError``.
+    """
+
+    def __init__(self, carla: Any) -> None:
+        wheel = carla.VehicleWheelLocation
+        self._front = (wheel.FL_Wheel, wheel.FR_Wheel)
+        self._all = (*self._front, wheel.BL_Wheel, wheel.BR_Wheel)
+        self._door = carla.VehicleDoor.names
+        self._vehicles: dict[int, Any] = {}
+
+    def move_doors(self, world: Any, moves: Mapping[int, tuple[DoorMove, ...]]) -> None:
+        """Open and shut doors; who is gone is left out."""
+        self._look_up(world, moves)
+        for actor, doors in moves.items():
+            vehicle = self._vehicles.get(actor)
+            if vehicle is None:
+                continue
+            for door, opens in doors:
+                (vehicle.open_door if opens else vehicle.close_door)(self._door[door])
+
+    def turn(self, world: Any, turns: Mapping[int, WheelTurn]) -> None:
+        """Turn the wheels of four-wheeled vehicles; who is gone is left out."""
+        self._look_up(world, turns)
+        for actor, turn in turns.items():
+            vehicle = self._vehicles.get(actor)
+            if vehicle is None:
+                continue
+            for wheel in self._front:
+                vehicle.set_wheel_steer_direction(wheel, turn.steer)
+            for wheel in self._all:
+                vehicle.set_wheel_pitch_angle(wheel, turn.pitch)
+
+    def _look_up(self, world: Any, actors: Iterable[int]) -> None:
+        unknown = [actor for actor in actors if actor not in self._vehicles]
+        if unknown:
+            self._vehicles.update(
+                {get_actor.id: get_actor for get_actor in world.get_actors(unknown)}
+            )
+
+    def forget(self, actors: Iterable[int]) -> None:
+        """Forget vehicles that are gone."""
+        for actor in actors:
+            self._vehicles.pop(actor, None)
+
+
+# -------------------------------------------------------------- A CARLA server while it is borrowed
 GRACE = 15.0
 """Seconds that a server that has stopped answering gets to be given back after all."""
 FREE_AIR = 12.0

@@ -4,11 +4,19 @@ A process of its own, for the client keeps Python's lock while it waits. It read
 line of JSON, says on which port it listens, and ends with its standard input. Everything is passed
 on as it comes; calls, answers and states of the world are written down. The server says where its
 streams are by tokens of 24 bytes; those are changed to lead through here as well.
+
+Transcript of what a CARLA server and a client said to each other: one JSON object a line.
+
+The first line says what the file is. Each other line is a frame: a call or its answer as they were
+on the wire (msgpack-rpc), or a state of the world as it was streamed. What sensors see is not in a
+transcript.
 """
 
 from __future__ import annotations
 
 import asyncio
+import base64
+import binascii
 import gzip
 import ipaddress
 import json
@@ -18,21 +26,135 @@ import struct
 import sys
 import time
 from contextlib import suppress
+from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import msgpack
 
-from odscen.carla.server.protocol_transcript import (
-    FrameKind,
-    ProtocolFrame,
-    frame_line,
-    header_line,
-)
+from odscen.base.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Iterator
+    from collections.abc import Coroutine, Iterable, Iterator
 
+
+# -------------------------------- transcript of what a CARLA server and a client said to each other
+FORM, VERSION = "odscen-carla-protocol", 1
+
+
+class FrameKind(StrEnum):
+    """What a frame is."""
+
+    CALL = "call"
+    ANSWER = "answer"
+    STATE = "state"
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolFrame:
+    """One frame.
+
+    Attributes
+    ----------
+    at
+        Seconds since the recording began.
+    connection
+        Counted from 1; 0 for states.
+    name
+        Of the function that is called or that has answered.
+    number
+        Of the call on its connection; the frame's own number for states.
+    data
+        As it was on the wire; of states without their length.
+    """
+
+    at: float
+    connection: int
+    kind: FrameKind
+    name: str
+    number: int
+    data: bytes
+
+
+def header_line() -> str:
+    """First line of a transcript."""
+    return json.dumps({"format": FORM, "version": VERSION}) + "\n"
+
+
+def frame_line(frame: ProtocolFrame) -> str:
+    """A frame as one line."""
+    return (
+        json.dumps(
+            {
+                "at": round(frame.at, 6),
+                "connection": frame.connection,
+                "kind": str(frame.kind),
+                "name": frame.name,
+                "number": frame.number,
+                "data": base64.b64encode(frame.data).decode("ascii"),
+            }
+        )
+        + "\n"
+    )
+
+
+def parse_transcript(lines: Iterable[str], *, file: str) -> list[ProtocolFrame]:
+    """Frames of a transcript.
+
+    A last line that was not written whole, because the recording was killed, is left out.
+
+    Raises
+    ------
+    InputError
+        If it is no transcript; names the line.
+    """
+    frames = []
+    rows = enumerate(lines, start=1)
+    _check_header(next(rows, (1, ""))[1], file=file)
+    for number, line in rows:
+        if not line.endswith("\n"):
+            break
+        try:
+            frames.append(_parse_frame(json.loads(line)))
+        except (ValueError, KeyError, TypeError, binascii.Error) as error:
+            raise InputError(
+                f"is no frame of a transcript: {error}", file=file, element=f"line {number}"
+            ) from error
+    return frames
+
+
+def _check_header(line: str, *, file: str) -> None:
+    try:
+        head = json.loads(line)
+    except ValueError:
+        head = None
+    if not isinstance(head, dict) or head.get("format") != FORM:
+        raise InputError(
+            f"is no transcript of CARLA's protocol: the first line has to name {FORM}",
+            file=file,
+            element="line 1",
+        )
+    if head.get("version") != VERSION:
+        raise InputError(
+            f"version {head.get('version')!r} is not known, {VERSION} is",
+            file=file,
+            element="line 1",
+        )
+
+
+def _parse_frame(row: dict[str, Any]) -> ProtocolFrame:
+    return ProtocolFrame(
+        float(row["at"]),
+        int(row["connection"]),
+        FrameKind(row["kind"]),
+        str(row["name"]),
+        int(row["number"]),
+        base64.b64decode(row["data"], validate=True),
+    )
+
+
+# ---------------------------------------------------- python -m odscen.carla.server.recording_proxy
 _CHUNK = 1 << 16
 _TOKEN = struct.Struct("<IHBB16s")
 _TOKEN_MARK = b"\xc4\x18"

@@ -58,8 +58,8 @@ class ParkingUse:
     Attributes
     ----------
     stays
-        Columns of :func:`odscen.sumo.outputs.stop_table.stay_table`, and ``wanted``: the area that
-        the trip was to end in.
+        Columns of :func:`odscen.sumo.outputs.output_tables.stay_table`, and ``wanted``: the area
+        that the trip was to end in.
     areas
         Of the plan.
     """

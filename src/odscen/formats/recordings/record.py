@@ -1,21 +1,130 @@
-"""A recording of a run."""
+"""A recording of a run.
+
+What lights show to lanes, on a clock of equal steps.
+
+SUMO's letters belong to movements from lane to lane. A movement is looked up on the lane graph: the
+lane that leads to the light, and the first lane through the junction on the shortest way on.
+"""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from odscen.base.errors import InputError
+from odscen.convert.lane_table.light_heads import letter_state
 from odscen.formats.recordings.map_elements import map_elements
-from odscen.formats.recordings.run_recording import RunRecording
-from odscen.formats.recordings.signal_grid import lane_signals
+from odscen.formats.recordings.run_recording import LaneSignals, LightColor, RunRecording
 from odscen.formats.recordings.track_grid import ExportWindow, instants, tracks_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
+    import polars as pl
+    from numpy.typing import NDArray
+
+    from odscen.base.arrays import FloatArray
     from odscen.formats.base import ExportSource
+    from odscen.formats.recordings.run_recording import LaneElement
+    from odscen.sumo.realize.sumo_map import SumoMap
 
+
+# --------------------------------------------- what lights show to lanes, on a clock of equal steps
+_FARTHEST = 6
+"""Lanes in a row that a movement may have at most."""
+_COLORS = {
+    "Green": LightColor.GREEN,
+    "Yellow": LightColor.YELLOW,
+    "Red": LightColor.RED,
+    "Off": LightColor.OFF,
+}
+_SAME = 1e-6
+
+
+def lane_signals(
+    sumo_map: SumoMap, lanes: Sequence[LaneElement], states: pl.DataFrame | None, times: FloatArray
+) -> LaneSignals:
+    """States of all lanes with a light.
+
+    Parameters
+    ----------
+    states
+        As of :func:`~odscen.runs.recorded.read_light_states`.
+    times
+        Shape ``(T,)``, s.
+    """
+    shown = {} if states is None else dict(_letters_by_light(states, times))
+    found: dict[tuple[int, int], tuple[str, NDArray[np.uint8]]] = {}
+    for light, link, approach, lane in _light_movements(sumo_map, lanes):
+        letters = shown.get(light)
+        if letters is None:
+            continue
+        color = _colors_of_link(letters, link)
+        turn = (
+            next(sumo_light for sumo_light in sumo_map.lights if sumo_light.id == light)
+            .links[link]
+            .turn
+        )
+        known = found.get((approach, lane))
+        # Two links over one lane: who may go on either of them has green.
+        found[approach, lane] = (turn, color if known is None else np.maximum(known[1], color))
+    keys = sorted(found)
+    return LaneSignals(
+        lane=np.array([lane for _, lane in keys], dtype=np.int64),
+        approach=np.array([approach for approach, _ in keys], dtype=np.int64),
+        turn=tuple(found[key][0] for key in keys),
+        stop=np.array([lanes[approach].centre[-1] for approach, _ in keys]).reshape(-1, 3),
+        color=np.array([found[key][1] for key in keys], dtype=np.uint8).reshape(-1, len(times)),
+    )
+
+
+def _letters_by_light(states: pl.DataFrame, times: FloatArray) -> Iterator[tuple[str, list[str]]]:
+    """For each light the letters that it shows at each instant."""
+    for (light,), rows in states.sort("light", "time").group_by("light", maintain_order=True):
+        changes = rows["time"].to_numpy()
+        letters = rows["state"].to_list()
+        at = np.searchsorted(changes, times + _SAME, side="right") - 1
+        yield str(light), [letters[max(k, 0)] for k in at.tolist()]
+
+
+def _colors_of_link(letters: Sequence[str], link: int) -> NDArray[np.uint8]:
+    return np.array(
+        [_COLORS[letter_state(letter[link])] if link < len(letter) else 0 for letter in letters],
+        dtype=np.uint8,
+    )
+
+
+def _light_movements(
+    sumo_map: SumoMap, lanes: Sequence[LaneElement]
+) -> Iterator[tuple[str, int, int, int]]:
+    """Light, link, lane before and lane behind the stop line, of each movement that is found."""
+    row_of = {lane.key: row for row, lane in enumerate(lanes)}
+    for light in sumo_map.lights:
+        for link, one in enumerate(light.links):
+            source = row_of.get(sumo_map.lane_names.get(one.source, ""), -1)
+            target = row_of.get(sumo_map.lane_names.get(one.target, ""), -1)
+            if source < 0 or target < 0:
+                continue
+            path = _shortest_lane_path(lanes, source, target)
+            inside = next((k for k, row in enumerate(path) if lanes[row].junction), None)
+            if inside:
+                yield light.id, link, path[inside - 1], path[inside]
+
+
+def _shortest_lane_path(lanes: Sequence[LaneElement], source: int, target: int) -> list[int]:
+    """Fewest lanes from one to another, both included; empty if there is no way, or a long one."""
+    paths = [[source]]
+    for _ in range(_FARTHEST):
+        paths = [[*path, row] for path in paths for row in lanes[path[-1]].exits]
+        there = next((path for path in paths if path[-1] == target), None)
+        if there is not None:
+            return there
+    return []
+
+
+# ----------------------------------------------------------------------------- A recording of a run
 WINDOW = ("begin", "end")
 """Options of all formats that are written from a recording: seconds of the simulation."""
 

@@ -15,6 +15,7 @@ _PACKED = ((b"\x1f\x8b", "gzip"), (b"PK\x03\x04", "zip"), (b"BZh", "bzip2"), (b"
 _TEXT = re.compile(r"[\t\n\r\f\x20-\x7e\x80-\U0010ffff]*")
 
 _BY_NETCONVERT = "netconvert makes OpenDRIVE of it: netconvert {} FILE --opendrive-output MAP.xodr"
+_AS_OSM = "give it the ending {} and add it again; it is converted to OpenDRIVE then"
 _NEEDS_IMPORTER = (
     "convert it to OpenDRIVE (.xodr), or install a package with an importer for it; "
     "`odscen maps importers` lists those that are installed"
@@ -52,8 +53,7 @@ def file_kind(content: bytes, file: str) -> FileKind:
     if suffix in (".rrhd", ".rrscene"):
         return FileKind("a RoadRunner file", "export OpenDRIVE from RoadRunner (File > Export)")
     if b"OSMHeader" in content[:64]:
-        advice = "convert it to .osm (osmium cat FILE -o MAP.osm), then: "
-        return FileKind("OpenStreetMap (PBF)", advice + _BY_NETCONVERT.format("--osm-files"))
+        return FileKind("OpenStreetMap (PBF)", _AS_OSM.format(".osm.pbf"))
     root = root_element(content)
     if root is not None:
         return _xml_kind(root, content)
@@ -72,7 +72,7 @@ def _xml_kind(root: str, content: bytes) -> FileKind:
         if re.search(rb"""v=["'](?:lanelet|regulatory_element)["']""", content):
             advice = "add it under a name that ends with .osm (`odscen maps importers`: lanelet2)"
             return FileKind("a Lanelet2 map", advice)
-        return FileKind("OpenStreetMap", _BY_NETCONVERT.format("--osm-files"))
+        return FileKind("OpenStreetMap", _AS_OSM.format(".osm"))
     if root == "net":
         return FileKind("a SUMO network", _BY_NETCONVERT.format("--sumo-net-file"))
     if root == "commonRoad":

@@ -1,12 +1,93 @@
 """What SUMO writes while it runs, put into a folder and made into the tables that we keep.
 
 The configuration names all of it, so that plain ``sumo -c`` records the same beside it.
+
+SUMO's log of stops as tables: visits of stops that have ended, and stays in parking places.
+
+Visits of stops:
+
+=========== ======================================================================
+column      meaning
+=========== ======================================================================
+actor       id of the vehicle
+stop        id of the stop
+arrival     s when it stood
+departure   s when it drove on
+scheduled   s of the scheduled departure; null without a timetable
+=========== ======================================================================
+
+Stays in parking places:
+
+=========== ======================================================================
+column      meaning
+=========== ======================================================================
+actor       id of the vehicle
+area        id of the parking area
+arrival     s when it took its place
+begins      whether its trip began there
+departure   s when it left it; null if it was still there when the run ended
+=========== ======================================================================
+
+SUMO's tripinfo as a table, one row for each vehicle and person who set out.
+
+=================== ==================================================================
+column              meaning
+=================== ==================================================================
+id                  of the actor
+person              whether it walks
+depart, arrival     s; arrival null if it had not arrived when the run ended
+duration            of the trip, s; so far if it had not arrived
+route_length        m; so far if it had not arrived, null for a person who had not
+waiting_time        s that it was stopped (below 0.1 m/s)
+waiting_count       how many times it came to a halt; null for persons
+time_loss           s lost by driving (walking) below the speed it wished for; null for a
+                    person who had not arrived
+=================== ==================================================================
+
+Of a car that begins or ends its trip in a parking place, the trip is from leaving the one to
+taking the other.
+
+XML, because SUMO 1.28 ends with an error when it is to write vehicles and persons as Parquet.
+
+SUMO's lane data as a table of what happened on each lane in each interval, in SI units.
+
+=================================== ==============================================================
+column                              meaning
+=================================== ==============================================================
+begin, end                          interval, s
+edge, lane                          SUMO's ids
+seconds                             time that vehicles spent, vehicle-seconds
+distance                            that they drove, m
+entered, left                       vehicles that came from and went to another edge
+departed, arrived                   vehicles whose trips began and ended here
+waiting                             of ``seconds``, those in which they were stopped (below 0.1 m/s)
+time_loss                           of ``seconds``, those lost by driving below the desired speed
+co2, co, hc, nox, pmx, fuel         g, if emissions were recorded
+electricity                         Wh, if emissions were recorded
+=================================== ==============================================================
+
+A vehicle is where its front is. SUMO itself counts a vehicle on every lane that a part of its body
+is on, so that its seconds add up to more than there were: by a sixth in a town of short lanes.
+SUMO also gives, per lane, travel time and distance of the fronts, from which
+
+    seconds   = traveltime * distance / length
+    time_loss = seconds - distance * (sampled - timeLoss) / (speed * sampled)
+    waiting   = waitingTime - of_rears, where, of the rears whose fronts are further on,
+    of_rears  = (sampled - seconds) - (speed * sampled - distance) * (sampled - waitingTime)
+                / (speed * sampled)
+
+with ``sampled`` for its seconds. The second is exact if all who were on the lane wished to drive
+equally fast; where it was held against the trips, the sum was less than 2 % below theirs. The third
+is exact if rears that move are as fast as all who move; held against every step, the sum was less
+than 2 % below.
 """
 
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.errors import SimulationError
 from odscen.figures.by_place.lane_parts import part_sums
@@ -14,6 +95,7 @@ from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.figures.by_place.traffic_sums import INTERVAL
 from odscen.figures.measures.summary import Trip, actor_outcomes, actors_text, outcome_row
 from odscen.records.run_events import event_line, events_text
+from odscen.records.run_plan import begin_area
 from odscen.runs.layout import (
     ACTORS_FILE,
     EMISSIONS_FILE,
@@ -30,14 +112,13 @@ from odscen.runs.layout import (
     VISITS_FILE,
 )
 from odscen.runs.parts import tidy_part
+from odscen.runs.xml_rows import elements
 from odscen.sumo.outputs.conflict_files import tidy_conflicts
-from odscen.sumo.outputs.lane_measures import lane_table
 from odscen.sumo.outputs.signal_log import tidy_signals
-from odscen.sumo.outputs.stop_table import stay_table, stop_table
-from odscen.sumo.outputs.trip_table import ParkedCar, Stay, trip_table
+from odscen.sumo.realize.measure_files import EMISSIONS
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     import polars as pl
@@ -46,6 +127,363 @@ if TYPE_CHECKING:
     from odscen.records.run_plan import Plan
 
 
+# -------------------------------- SUMO's lane data as a table of what happened on each lane in each
+_MOST_TRAVEL_TIME = 99_999.0
+"""Seconds; SUMO gives 100,000 at most, and then not what it was; none where all were stopped."""
+_COUNTS = ("entered", "left", "departed", "arrived")
+
+
+def lane_table(
+    lanes: Path,
+    emissions: Path | None,
+    lengths: Mapping[str, Mapping[str, float]],
+    present: Mapping[str, int] | None = None,
+) -> pl.DataFrame:
+    """Read what SUMO has written.
+
+    Parameters
+    ----------
+    lanes, emissions
+        SUMO's Parquet files; ``None`` if emissions were not recorded.
+    lengths
+        Of lanes for vehicles, m, by edge. SUMO's mesoscopic model measures edges: what it gives
+        of one is given to the first of these lanes.
+    present
+        How many vehicles were on each lane when a saved state was loaded. SUMO counts them as
+        having entered.
+
+    Returns
+    -------
+    Sorted by ``begin`` and ``lane``; without rows if no vehicle was there.
+    """
+    import polars as pl
+
+    by_lane = {lane: length for lanes in lengths.values() for lane, length in lanes.items()}
+    own = pl.LazyFrame(
+        {"lane": list(by_lane), "length": list(by_lane.values())},
+        schema={"lane": pl.String, "length": pl.Float64},
+    )
+    # SUMO leads teleported vehicles over the first lane of an edge, be it a sidewalk.
+    rows = _rename_columns(lanes, lengths).join(own, on="lane")
+    entered: tuple[pl.Expr, ...] = ()
+    if emissions is not None:
+        measured = _rename_columns(emissions, lengths).select("begin", "lane", *_emission_columns())
+        rows = rows.join(measured, on=["begin", "lane"], how="left")
+    if present:
+        here = pl.LazyFrame({"lane": list(present.keys()), "present": list(present.values())})
+        first = pl.col("begin") == pl.col("begin").min()
+        there = pl.when(first).then("present").otherwise(0).fill_null(0)
+        rows = rows.join(here, on="lane", how="left").with_columns(present=there)
+        entered = ((pl.col("entered") - pl.col("present")).clip(0),)
+    seconds, time_loss, waiting, kept = _measure_columns(emissions=emissions is not None)
+    return (
+        rows.with_columns(seconds)
+        .with_columns(time_loss, waiting, *entered)
+        .select(kept)
+        .sort("begin", "lane")
+        # To plan so small a query, and to wake threads for it, takes longer than to do it.
+        .collect(engine="in-memory", optimizations=pl.QueryOptFlags.none())
+    )
+
+
+@cache
+def _measure_columns(*, emissions: bool) -> tuple[pl.Expr, pl.Expr, pl.Expr, tuple[pl.Expr, ...]]:
+    """Seconds; with them, time loss and waiting; then all columns. Made once for all runs."""
+    import polars as pl
+
+    col = pl.col
+    sampled, moved = col("sampledSeconds"), col("speed") * col("sampledSeconds")
+    # Where hardly a vehicle moved there is no travel time, and SUMO's density has an upper bound;
+    # all were stopped for the whole interval then, a whole number of vehicles.
+    at_least = col("density") * col("length") / 1000.0
+    still = pl.when(col("entered") + col("left") + col("departed") + col("arrived") == 0)
+    standing = still.then((at_least - 1e-3).ceil()).otherwise(at_least)
+    standing *= col("end") - col("begin")
+    fronts = (
+        pl.when(col("traveltime").fill_null(_MOST_TRAVEL_TIME) >= _MOST_TRAVEL_TIME)
+        .then(pl.min_horizontal(sampled, standing))
+        .otherwise(col("traveltime") * col("distance") / col("length"))
+    )
+    loss = pl.when(moved > 0.0).then(
+        col("seconds") - col("distance") * (sampled - col("timeLoss")) / moved
+    )
+    waited = col("waitingTime")
+    rears = (
+        pl.when(moved > 0.0)
+        .then(sampled - col("seconds") - (moved - col("distance")) * (sampled - waited) / moved)
+        .otherwise(sampled - col("seconds"))
+    )
+    seconds = fronts.fill_null(0.0).alias("seconds")
+    time_loss = loss.otherwise(col("timeLoss")).fill_null(0.0).clip(0.0, col("seconds"))
+    waiting = (waited - rears.clip(0.0, waited)).fill_null(0.0).clip(0.0, col("seconds"))
+    emitted = (col(name.lower()).fill_null(0.0) for name in EMISSIONS) if emissions else ()
+    kept = (
+        *map(col, ("begin", "end", "edge", "lane", "seconds", "distance")),
+        *(col(name).cast(pl.Int64) for name in _COUNTS),
+        *map(col, ("waiting", "time_loss")),
+        *emitted,
+    )
+    return seconds, time_loss.alias("time_loss"), waiting.alias("waiting"), kept
+
+
+def _rename_columns(file: Path, lengths: Mapping[str, Mapping[str, float]]) -> pl.LazyFrame:
+    """Rows of a file of lane data; columns lose their prefix, times become numbers."""
+    import polars as pl
+
+    rows = pl.read_parquet(file)
+    if "edge_id" not in rows.columns:  # no vehicle was there, and SUMO had no columns to write
+        return _empty_measures()
+    renamed = {name: name.removeprefix("lane_").removeprefix("edge_") for name in rows.columns}
+    renamed |= {"edge_id": "edge", "lane_id": "lane"}
+    lazy = rows.lazy()
+    if "lane_id" not in rows.columns:
+        lazy = lazy.with_columns(
+            lane_id=pl.col("edge_id").replace_strict(
+                {edge: next(iter(own)) for edge, own in lengths.items()},
+                default=None,
+                return_dtype=pl.String,
+            )
+        )
+    return lazy.rename(renamed, strict=False).with_columns(
+        begin=pl.col("interval_begin").cast(pl.Float64),
+        end=pl.col("interval_end").cast(pl.Float64),
+    )
+
+
+def _empty_measures() -> pl.LazyFrame:
+    import polars as pl
+
+    from odscen.sumo.realize.measure_files import LANE_ATTRIBUTES
+
+    numbers = ("begin", "end", *LANE_ATTRIBUTES, *(f"{name}_abs" for name in EMISSIONS))
+    texts = ("edge", "lane")
+    return pl.LazyFrame(
+        schema={**dict.fromkeys(numbers, pl.Float64), **dict.fromkeys(texts, pl.String)}
+    )
+
+
+@cache
+def _emission_columns() -> tuple[pl.Expr, ...]:
+    return tuple(map(_in_units, EMISSIONS))
+
+
+def _in_units(name: str) -> pl.Expr:
+    import polars as pl
+
+    factor = 1.0 if name == "electricity" else 1e-3
+    return (pl.col(f"{name}_abs") * factor).alias(name.lower())
+
+
+# -------------------------- SUMO's tripinfo as a table, one row for each vehicle and person who set
+NOT_PARKED: Mapping[str, ParkedCar] = MappingProxyType({})
+
+
+class Stay(NamedTuple):
+    """When a car took a parking place and left it, s; ``left`` ``None`` if it is still there."""
+
+    came: float
+    left: float | None
+
+
+class ParkedCar(NamedTuple):
+    """A car whose trip begins or ends parked, with what is known of that.
+
+    The stay at its beginning is not known if it was in an earlier slice; ``counted`` is set if the
+    trip ended in an earlier slice and the stay after it, too.
+    """
+
+    first: Stay | None
+    last: Stay | None
+    counted: bool = False
+
+    @property
+    def left_out(self) -> bool:
+        """Whether its trip is in another table, or it has not left where it begins."""
+        waits = self.first is not None and self.first.left is None
+        return waits or (self.counted and self.last is None)
+
+
+def trip_table(
+    tripinfo: Path, *, unfinished: bool, parked: Mapping[str, ParkedCar] = NOT_PARKED
+) -> pl.DataFrame:
+    """Read SUMO's tripinfo file; in order of arrival, then of ids, the unfinished last.
+
+    Parameters
+    ----------
+    parked
+        Cars whose trips begin or end parked, by id.
+    unfinished
+        Whether those who have not arrived are trips too: not at a boundary between slices, where
+        SUMO writes all who are on the road.
+
+    Raises
+    ------
+    lxml.etree.XMLSyntaxError
+        If the file does not go on to its end.
+    """
+    import polars as pl
+
+    schema = {
+        "id": pl.String,
+        "person": pl.Boolean,
+        "depart": pl.Float64,
+        "arrival": pl.Float64,
+        "duration": pl.Float64,
+        "route_length": pl.Float64,
+        "waiting_time": pl.Float64,
+        "waiting_count": pl.Int64,
+        "time_loss": pl.Float64,
+    }
+    rows = [row for row in logged_trips(tripinfo, parked) if unfinished or row[3] is not None]
+    table = pl.DataFrame(rows, schema=schema, orient="row")
+    return table.sort("arrival", "depart", "id", nulls_last=True)
+
+
+def logged_trips(tripinfo: Path, parked: Mapping[str, ParkedCar]) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of the table, columns in their order, as SUMO has logged them.
+
+    Raises
+    ------
+    lxml.etree.XMLSyntaxError
+        If the file does not go on to its end.
+    """
+    for element in elements(tripinfo, "tripinfo", "personinfo"):
+        if element.tag == "personinfo":
+            yield _walk_row(element)
+            continue
+        car = parked.get(element.get("id") or "")
+        if car is None or not car.left_out:
+            yield _drive_row(element, car)
+
+
+def _drive_row(trip: Any, car: ParkedCar | None) -> tuple[Any, ...]:
+    value = trip.get
+    depart, arrival = float(value("depart")), _known_number(value("arrival"))
+    duration = float(value("duration"))
+    if car is not None:
+        depart, arrival, duration = _between_stays(trip, car, depart, arrival, duration)
+    return (
+        value("id"),
+        False,
+        depart,
+        arrival,
+        duration,
+        float(value("routeLength")),
+        float(value("waitingTime")),
+        int(value("waitingCount")),
+        float(value("timeLoss")),
+    )
+
+
+def _between_stays(
+    trip: Any, car: ParkedCar, depart: float, arrival: float | None, duration: float
+) -> tuple[float, float | None, float]:
+    """Departure, arrival and duration from leaving a parking place to taking one."""
+    stopped = float(trip.get("stopTime"))
+    over = depart + duration if arrival is None else arrival
+    end = car.last
+    if end is not None:
+        stopped += 0.0 if end.left is None else over - end.left
+        arrival = end.came
+    driven = duration - stopped
+    return round((over if end is None else end.came) - driven, 4), arrival, round(driven, 4)
+
+
+def _walk_row(person: Any) -> tuple[Any, ...]:
+    """Of a person with one walk, as all of ours."""
+    walk = person.find("walk")
+    arrival = None if walk is None else _known_number(walk.get("arrival"))
+    source = person if walk is None else walk
+    return (
+        person.get("id"),
+        True,
+        float(person.get("depart")),
+        arrival,
+        _known_number(source.get("duration")),
+        None if walk is None else _known_number(walk.get("routeLength")),
+        float(person.get("waitingTime")),
+        None,
+        None if arrival is None else float(person.get("timeLoss")),
+    )
+
+
+def _known_number(text: str) -> float | None:
+    """SUMO writes -1 for what is not known."""
+    value = float(text)
+    return None if value < 0.0 else value
+
+
+# -------------------------------------------------------------------- SUMO's log of stops as tables
+def stop_table(stopinfo: Path) -> pl.DataFrame:
+    """Read SUMO's stop-output; in order of departure, then of ids.
+
+    Visits that had not ended when the run did are left out, and stops that are none of a line.
+
+    Raises
+    ------
+    lxml.etree.XMLSyntaxError
+        If the file does not go on to its end.
+    """
+    import polars as pl
+
+    rows = []
+    for row in elements(stopinfo, "stopinfo"):
+        left, delay = float(row.get("ended", "-1")), row.get("delay")
+        if row.get("busStop") and left >= 0.0:
+            scheduled = None if delay is None else round(left - float(delay), 4)
+            rows.append(
+                (row.get("id"), row.get("busStop"), float(row.get("started", "")), left, scheduled)
+            )
+    schema = {
+        "actor": pl.String,
+        "stop": pl.String,
+        "arrival": pl.Float64,
+        "departure": pl.Float64,
+        "scheduled": pl.Float64,
+    }
+    table = pl.DataFrame(rows, schema=schema, orient="row")
+    return table.sort("departure", "actor", "stop")
+
+
+def stay_table(stopinfo: Path, areas: Iterable[str], *, unfinished: bool) -> pl.DataFrame:
+    """Read stays in parking places from SUMO's stop-output; in order of arrival, then of ids.
+
+    Parameters
+    ----------
+    areas
+        Ids of the parking areas of the plan.
+    unfinished
+        Whether the run has ended, so that who is parked stays: at a boundary between slices, where
+        SUMO writes these too, the next one has them again.
+
+    Raises
+    ------
+    lxml.etree.XMLSyntaxError
+        If the file does not go on to its end.
+    """
+    import polars as pl
+
+    known = {area: (area, False) for area in areas}
+    known |= {begin_area(area): (area, True) for area in known}
+    rows = []
+    for row in elements(stopinfo, "stopinfo"):
+        came, left = float(row.get("started", "-1")), float(row.get("ended", "-1"))
+        if not row.get("parkingArea") or came < 0.0:
+            continue
+        if left >= 0.0 or unfinished:
+            area, begins = known[str(row.get("parkingArea"))]
+            rows.append((row.get("id"), area, begins, came, left if left >= 0.0 else None))
+    schema = {
+        "actor": pl.String,
+        "area": pl.String,
+        "begins": pl.Boolean,
+        "arrival": pl.Float64,
+        "departure": pl.Float64,
+    }
+    return pl.DataFrame(rows, schema=schema, orient="row").sort("arrival", "actor")
+
+
+# ----------------------- what SUMO writes while it runs, put into a folder and made into the tables
 _TRIP_COLUMNS = ("id", "time_loss", "waiting_time", "waiting_count")
 _SMALL = 32 << 20
 """Bytes."""
@@ -76,7 +514,7 @@ def tidy_outputs(
     Parameters
     ----------
     lengths, present
-        As of :func:`odscen.sumo.outputs.lane_measures.lane_table`.
+        As of :func:`odscen.sumo.outputs.output_tables.lane_table`.
     plan
         Says who parks.
     parked

@@ -303,19 +303,9 @@ def _project(degrees: FloatArray, origin: str) -> tuple[FloatArray, str, list[Re
         raise InputError(
             f"latitude {worst[0]:g}, longitude {worst[1]:g} is outside UTM", element="node"
         )
-    if origin:
-        try:
-            lat, lon = (float(value) for value in origin.replace(";", ",").split(","))
-        except ValueError:
-            raise InputError(f"origin {shown(origin)} is not LATITUDE,LONGITUDE") from None
-        if not (abs(lat) <= 84.5 and abs(lon) <= 180.0):
-            raise InputError(f"origin {shown(origin)} is no place that UTM has")
-    else:
-        low, high = degrees.min(axis=0), degrees.max(axis=0)
-        lat, lon = (round(float(value), 4) for value in (low + high) / 2.0)
-    zone, x, y = _utm(lat, lon)
-    reference = _zone_reference(zone, round(500000.0 - x, 6), round(-y, 6))
-    reason = f"UTM zone {zone} with x = y = 0 at latitude {lat:g}, longitude {lon:g}"
+    low, high = degrees.min(axis=0), degrees.max(axis=0)
+    middle = ((low + high) / 2.0).round(4).tolist()
+    reference, reason = projection_at(origin or f"{middle[0]},{middle[1]}")
     if origin:
         row = ReportEntry(ElementOutcome.KEPT, "header > geoReference", f"{reason}, as chosen")
     else:
@@ -327,6 +317,25 @@ def _project(degrees: FloatArray, origin: str) -> tuple[FloatArray, str, list[Re
             0.9,
         )
     return _transform(reference, degrees), reference, [row]
+
+
+def projection_at(origin: str) -> tuple[str, str]:
+    """UTM with its zero at ``"latitude,longitude"``: the PROJ string, and what it is in words.
+
+    Raises
+    ------
+    InputError
+        If the origin is none.
+    """
+    try:
+        lat, lon = (float(value) for value in origin.split(","))
+    except ValueError:
+        raise InputError(f"origin {shown(origin)} is not LATITUDE,LONGITUDE") from None
+    if not (abs(lat) <= 84.5 and abs(lon) <= 180.0):
+        raise InputError(f"origin {shown(origin)} is no place that UTM has")
+    zone, x, y = _utm(lat, lon)
+    reference = _zone_reference(zone, round(500000.0 - x, 6), round(-y, 6))
+    return reference, f"UTM zone {zone} with x = y = 0 at latitude {lat:g}, longitude {lon:g}"
 
 
 def _reference_of_local(local: FloatArray, degrees: FloatArray, zones: Counter[str]) -> str:

@@ -6,29 +6,213 @@ An installed package offers one in its ``pyproject.toml``::
     mine = "my_package.drivers:MyDriver"
 
 The page chooses among these and those that ship; it cannot name a module or a program.
+
+A behaviour model in another process, over its stdin and stdout or a socket.
+
+Messages are those of :mod:`odscen.learning.behaviour.behaviour_messages`.
 """
 
 from __future__ import annotations
 
 import json
+import os
+import select
 import shlex
 import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError, NotFoundError
+from odscen.learning.behaviour.behaviour_messages import (
+    HEAD,
+    MOST_BYTES,
+    action_from_bytes,
+    framed,
+    observation_bytes,
+    scene_bytes,
+)
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.learning.offered_models import installed_names, named_object, offered_models
 from odscen.learning.offered_options import values_for
 from odscen.runs.layout import BEHAVIOUR_FILE
-from odscen.sumo.worker.behaviour.piped_driver import PipedDriver, SocketDriver
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+    from typing import BinaryIO
 
-    from odscen.learning.behaviour.behaviour_model import BehaviourModel
+    import numpy as np
+
+    from odscen.base.arrays import BoolArray
+    from odscen.learning.behaviour.behaviour_model import (
+        BehaviourModel,
+        BehaviourScene,
+        DrivingAction,
+        RoadObservation,
+    )
     from odscen.learning.offered_models import OfferedModel
     from odscen.learning.offered_options import OptionValue
 
+
+# ----------------------------- A behaviour model in another process, over its stdin and stdout or a
+_LAST_LINES = 5
+_LAST_BYTES = 4000
+_BLOCK = 1 << 16
+_PATIENCE = 5.0
+"""Wall seconds that a program has to end when its input is over."""
+
+
+class _Peer:
+    """Asks and waits, over two descriptors that do not block."""
+
+    def __init__(self, seed: int, time_limit: float) -> None:
+        self._seed = seed
+        self._time_limit = time_limit
+        self._to = self._back = -1
+
+    def init(self, rng: np.random.Generator, scene: BehaviourScene) -> None:
+        """Start it, and tell it the scene."""
+        del rng  # it has the seed
+        self._open_connection()
+        os.set_blocking(self._to, False)
+        os.set_blocking(self._back, False)
+        self._ask_peer(scene_bytes(scene, self._seed))
+
+    def act(self, observation: RoadObservation, state: Any) -> tuple[DrivingAction, BoolArray]:
+        """Ask it."""
+        del state
+        return action_from_bytes(self._ask_peer(observation_bytes(observation)), len(observation))
+
+    def close(self) -> None:
+        """Say that the run is over."""
+
+    def _open_connection(self) -> None:
+        raise NotImplementedError
+
+    def _explain_end(self) -> str:
+        """Why it has ended."""
+        raise NotImplementedError
+
+    def _ask_peer(self, message: bytes) -> bytes:
+        end = time.monotonic() + self._time_limit
+        self._write_all(framed(message), end)
+        size = HEAD.unpack(self._read_all(HEAD.size, end))[0]
+        if size > MOST_BYTES:
+            raise InputError(f"its answer has {size:,} bytes; {MOST_BYTES:,} are the most")
+        return self._read_all(size, end)
+
+    def _write_all(self, data: bytes, end: float) -> None:
+        left = memoryview(data)
+        while left:
+            self._wait_ready([], [self._to], end)
+            try:
+                left = left[os.write(self._to, left) :]
+            except OSError as error:
+                raise InputError(self._explain_end()) from error
+
+    def _read_all(self, size: int, end: float) -> bytes:
+        blocks: list[bytes] = []
+        while size:
+            self._wait_ready([self._back], [], end)
+            try:
+                block = os.read(self._back, min(size, _BLOCK))
+            except OSError as error:
+                raise InputError(self._explain_end()) from error
+            if not block:
+                raise InputError(self._explain_end())
+            blocks.append(block)
+            size -= len(block)
+        return b"".join(blocks)
+
+    def _wait_ready(self, read: list[int], write: list[int], end: float) -> None:
+        left = end - time.monotonic()
+        ready = select.select(read, write, [], max(left, 0.0))
+        if not any(ready):
+            self._stop_peer()
+            raise InputError(f"it took more than {self._time_limit:g} s for a step")
+
+    def _stop_peer(self) -> None:
+        """End it."""
+
+
+class PipedDriver(_Peer):
+    """A program that is started with the run and ends with it."""
+
+    def __init__(self, words: Sequence[str], seed: int, time_limit: float) -> None:
+        super().__init__(seed, time_limit)
+        self._words = words
+        self._process: subprocess.Popen[bytes] | None = None
+        self._said: BinaryIO
+
+    def _open_connection(self) -> None:
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
+        try:
+            self._process = subprocess.Popen(
+                self._words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said
+            )
+        except OSError as error:
+            raise InputError(
+                f"it cannot be started: {error.strerror}", element=self._words[0]
+            ) from error
+        if self._process.stdin is not None and self._process.stdout is not None:
+            self._to, self._back = self._process.stdin.fileno(), self._process.stdout.fileno()
+
+    def close(self) -> None:
+        """Let it end: its input is over."""
+        if self._process is not None and self._process.stdin is not None:
+            with suppress(OSError):
+                self._process.stdin.close()
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(_PATIENCE)
+            if self._process.poll() is None:
+                self._process.kill()
+                self._process.wait()
+
+    def _explain_end(self) -> str:
+        code = None
+        if self._process is not None:
+            with suppress(subprocess.TimeoutExpired):
+                code = self._process.wait(1.0)
+        self._said.seek(max(0, self._said.seek(0, os.SEEK_END) - _LAST_BYTES))
+        lines = self._said.read().decode("utf-8", "replace").strip().splitlines()[-_LAST_LINES:]
+        said = f": {' / '.join(lines)}" if lines else ""
+        how = "it has closed its output" if code is None else f"it ended with exit code {code}"
+        return f"{how}{said}"
+
+    def _stop_peer(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+
+
+class SocketDriver(_Peer):
+    """A program that listens at a socket, and waits for the run."""
+
+    def __init__(self, path: str, seed: int, time_limit: float) -> None:
+        super().__init__(seed, time_limit)
+        self._path = path
+        self._socket: socket.socket
+
+    def _open_connection(self) -> None:
+        self._socket = socket.socket(socket.AF_UNIX)
+        try:
+            self._socket.connect(self._path)
+        except OSError as error:
+            raise InputError(f"no program listens at its socket: {error.strerror}") from error
+        self._to = self._back = self._socket.fileno()
+
+    def close(self) -> None:
+        """Hang up."""
+        if hasattr(self, "_socket"):
+            self._socket.close()
+
+    def _explain_end(self) -> str:
+        return "it has closed its socket"
+
+
+# ------------------------------------------------------------------------ doors of behaviour models
 GROUP = "odscen.behaviour"
 """Of entry points."""
 IDM, IMITATION = "idm", "imitation"

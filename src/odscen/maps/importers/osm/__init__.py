@@ -1,0 +1,1 @@
+"""OpenStreetMap to OpenDRIVE: reading, tags, the street network, its lines, its junctions."""

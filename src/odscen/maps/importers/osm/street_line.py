@@ -1,0 +1,256 @@
+"""Reference lines: polylines made smooth by arcs, so that the heading never jumps."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import shapely
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.base.arrays import FloatArray
+
+STRAY = 0.3
+"""Metres by which corners of a line may be off when it is made simpler."""
+MOST_OFF = 1.2
+"""Metres between a corner of the line and the arc that replaces it, where bends are not tight."""
+LEAST_RADIUS = 9.0
+"""Metres, of arcs at tight bends, where there is room for it."""
+_SHORTEST = 0.05
+
+
+class Pose(NamedTuple):
+    """Place in metres and heading in radians, counter-clockwise from +x."""
+
+    x: float
+    y: float
+    hdg: float
+
+    def ahead(self, distance: float) -> Pose:
+        """The pose so far ahead on a straight line."""
+        return Pose(
+            self.x + distance * math.cos(self.hdg), self.y + distance * math.sin(self.hdg), self.hdg
+        )
+
+    def left(self, distance: float) -> Pose:
+        """The pose so far to the left."""
+        return Pose(
+            self.x - distance * math.sin(self.hdg), self.y + distance * math.cos(self.hdg), self.hdg
+        )
+
+    def back(self) -> Pose:
+        """The same place, looking the other way."""
+        return Pose(self.x, self.y, self.hdg + math.pi)
+
+
+class Arc(NamedTuple):
+    """A stretch of constant curvature, 1/m, positive to the left; 0 is a straight line."""
+
+    start: Pose
+    length: float
+    curvature: float
+
+    def pose(self, s: float) -> Pose:
+        """The pose ``s`` metres along."""
+        x, y, hdg = self.start
+        if abs(self.curvature) < 1e-9:
+            return self.start.ahead(s)
+        turn = self.curvature * s
+        chord = 2.0 / self.curvature * math.sin(turn / 2)
+        mid = hdg + turn / 2
+        return Pose(x + chord * math.cos(mid), y + chord * math.sin(mid), hdg + turn)
+
+
+class StreetLine:
+    """Arcs one after the other, each of which begins as the one before ends."""
+
+    def __init__(self, arcs: Sequence[Arc]) -> None:
+        self.arcs = tuple(arcs)
+        self.starts = np.concatenate([[0.0], np.cumsum([arc.length for arc in arcs])])
+
+    @property
+    def length(self) -> float:
+        """Metres."""
+        return float(self.starts[-1])
+
+    def pose(self, s: float) -> Pose:
+        """The pose at ``s``; before the start and behind the end straight on."""
+        place = int(
+            np.clip(np.searchsorted(self.starts, s, side="right") - 1, 0, len(self.arcs) - 1)
+        )
+        if s > self.length:
+            return self.arcs[-1].pose(self.arcs[-1].length).ahead(s - self.length)
+        if s < 0.0:
+            return self.arcs[0].start.ahead(s)
+        return self.arcs[place].pose(s - float(self.starts[place]))
+
+    def cut(self, start: float, end: float) -> StreetLine:
+        """The part from ``start`` to ``end``."""
+        parts = []
+        for begin, arc in zip(self.starts[:-1].tolist(), self.arcs, strict=True):
+            low, high = max(start, begin), min(end, begin + arc.length)
+            if high - low > 1e-6:
+                parts.append(Arc(arc.pose(low - begin), high - low, arc.curvature))
+        return StreetLine(parts or [Arc(self.pose(start), max(end - start, 1e-3), 0.0)])
+
+    def reversed(self) -> StreetLine:
+        """The same line from its end to its start."""
+        return StreetLine(
+            [
+                Arc(arc.pose(arc.length).back(), arc.length, -arc.curvature)
+                for arc in self.arcs[::-1]
+            ]
+        )
+
+    def places(self, s: FloatArray, t: FloatArray | float = 0.0) -> FloatArray:
+        """Places ``(N, 2)`` at ``s``, so far to the left."""
+        poses = np.array([self.pose(float(value)) for value in s])
+        normal = np.column_stack([-np.sin(poses[:, 2]), np.cos(poses[:, 2])])
+        offset = np.broadcast_to(np.asarray(t, dtype=np.float64), s.shape)
+        placed: FloatArray = poses[:, :2] + normal * offset[:, None]
+        return placed
+
+    @cached_property
+    def _trace(self) -> tuple[shapely.LineString, FloatArray]:
+        s = np.linspace(0.0, self.length, max(2, int(self.length / 0.5) + 2))
+        return shapely.LineString(self.places(s)), s
+
+    @property
+    def trace(self) -> shapely.LineString:
+        """Its places every half metre."""
+        return self._trace[0]
+
+    def project(self, x: float, y: float) -> float:
+        """The s of the nearest place."""
+        trace, _ = self._trace
+        return float(trace.project(shapely.Point(x, y)) * self.length / max(trace.length, 1e-9))
+
+
+def smooth_line(points: Sequence[tuple[float, float]]) -> StreetLine:
+    """Lay lines and arcs along a polyline, tangent to each other; ends stay where they are.
+
+    At each corner an arc touches both segments. It is as wide as the segments allow, but stays
+    within :data:`MOST_OFF` of the corner if its radius is then :data:`LEAST_RADIUS` or more.
+    """
+    xy = np.array(points, dtype=np.float64)
+    keep = np.concatenate([[True], np.hypot(*np.diff(xy, axis=0).T) > _SHORTEST])
+    xy = xy[keep]
+    if len(xy) < 2:
+        return StreetLine([Arc(Pose(float(xy[0][0]), float(xy[0][1]), 0.0), _SHORTEST, 0.0)])
+    if len(xy) > 2:
+        closed = float(np.hypot(*(xy[0] - xy[-1]))) < 1.0
+        if not closed:
+            xy = np.asarray(shapely.LineString(xy).simplify(STRAY).coords)
+    steps = np.diff(xy, axis=0)
+    lengths = np.hypot(*steps.T)
+    headings = np.arctan2(steps[:, 1], steps[:, 0])
+    turns = np.remainder(np.diff(headings) + math.pi, 2 * math.pi) - math.pi
+    # A turn back on itself has no arc.
+    turns = np.clip(turns, -math.radians(170), math.radians(170))
+    count = len(turns)
+    wished = np.zeros(count)
+    for i in range(count):
+        bend = abs(float(turns[i]))
+        if bend < 1e-6:
+            continue
+        half = math.tan(bend / 2)
+        by_offset = MOST_OFF / (1.0 / math.cos(bend / 2) - 1.0) * half
+        wished[i] = max(by_offset, LEAST_RADIUS * half)
+    # Corners share the segment between them; ends need none of theirs.
+    tangents = wished.copy()
+    for i in range(count + 1):
+        before = tangents[i - 1] if i > 0 else 0.0
+        after = tangents[i] if i < count else 0.0
+        room = lengths[i] * (0.999 if 0 < i < count else 0.9)
+        if before + after > room:
+            share = room / (before + after)
+            # What one does not need of its half, the other may have.
+            half = room / 2
+            if i == 0:
+                tangents[i] = room
+            elif i == count:
+                tangents[i - 1] = room
+            elif before < half:
+                tangents[i] = room - before
+            elif after < half:
+                tangents[i - 1] = room - after
+            else:
+                tangents[i - 1] *= share
+                tangents[i] *= share
+    arcs: list[Arc] = []
+    place = Pose(float(xy[0][0]), float(xy[0][1]), float(headings[0]))
+    for i in range(count + 1):
+        before = float(tangents[i - 1]) if i > 0 else 0.0
+        after = float(tangents[i]) if i < count else 0.0
+        straight = float(lengths[i]) - before - after
+        if straight > 1e-4:
+            arcs.append(Arc(place, straight, 0.0))
+            place = arcs[-1].pose(straight)
+        if i < count and abs(float(turns[i])) > 1e-9:
+            radius = max(after, 1e-3) / math.tan(abs(float(turns[i])) / 2)
+            length = radius * abs(float(turns[i]))
+            if length > 1e-4:
+                arcs.append(Arc(place, length, math.copysign(1.0 / radius, float(turns[i]))))
+                place = arcs[-1].pose(length)
+    return StreetLine(arcs)
+
+
+class Cubic(NamedTuple):
+    """A parametric cubic in the frame of its start.
+
+    ``u, v = a + b p + c p^2 + d p^3`` with p from 0 to 1.
+    """
+
+    start: Pose
+    length: float
+    u: tuple[float, float, float, float]
+    v: tuple[float, float, float, float]
+
+    def places(self, count: int = 20) -> FloatArray:
+        """Places ``(count, 2)`` along it."""
+        p = np.linspace(0.0, 1.0, count)
+        powers = np.vander(p, 4, increasing=True)
+        u, v = powers @ np.array(self.u), powers @ np.array(self.v)
+        cos, sin = math.cos(self.start.hdg), math.sin(self.start.hdg)
+        placed: FloatArray = np.column_stack(
+            [self.start.x + u * cos - v * sin, self.start.y + u * sin + v * cos]
+        )
+        return placed
+
+
+def curve_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> Cubic:
+    """A smooth curve from pose to pose: a cubic Bezier curve with the handles of a circle.
+
+    ``4/3 tan(turn / 4)`` radii; ``bulge`` makes them at least so long, metres, which widens a turn
+    back.
+    """
+    dx, dy = end.x - start.x, end.y - start.y
+    cos, sin = math.cos(start.hdg), math.sin(start.hdg)
+    u, v = dx * cos + dy * sin, dy * cos - dx * sin
+    turn = math.remainder(end.hdg - start.hdg, 2.0 * math.pi)
+    chord, half = math.hypot(u, v), abs(turn) / 2.0
+    handle = chord / 3.0
+    if half > 1e-6:
+        handle = chord * 2.0 / 3.0 * math.tan(half / 2) / math.sin(half)
+    handle = max(handle, bulge)
+    # Where start and end are not symmetrical, as in a wide junction of a narrow street, the handles
+    # are those of two tangents that meet.
+    first = second = handle
+    if math.radians(20) < abs(turn) < math.radians(160):
+        meet = v / math.sin(turn)  # along the end's tangent, back to where the tangents meet
+        ahead = u - meet * math.cos(turn)
+        if meet > 0.0 and ahead > 0.0:
+            factor = 4.0 / 3.0 * math.tan(abs(turn) / 4) / math.tan(abs(turn) / 2)
+            first, second = max(factor, 0.55) * ahead, max(factor, 0.55) * meet
+    out = (u - second * math.cos(turn), v - second * math.sin(turn))
+    p0, p1, p2, p3 = np.array([(0.0, 0.0), (first, 0.0), out, (u, v)])
+    coefficients = np.array([p0, 3 * (p1 - p0), 3 * (p2 - 2 * p1 + p0), p3 - 3 * p2 + 3 * p1 - p0])
+    cu, cv = (tuple(float(c) for c in column) for column in coefficients.T)
+    p = np.linspace(0.0, 1.0, 401)
+    speed = np.hypot(*(c[1] + 2 * c[2] * p + 3 * c[3] * p**2 for c in (cu, cv)))
+    length = float(np.trapezoid(speed, dx=1.0 / 400))
+    return Cubic(start, length, cu, cv)  # type: ignore[arg-type]
