@@ -57,8 +57,10 @@ if TYPE_CHECKING:
     from odscen.experiments.studies import resume_experiment, run_experiment
     from odscen.experiments.studies import study_results as experiment_results
     from odscen.experiments.suite import read_suite
-    from odscen.figures.judging.expectations import parse_expectation
+    from odscen.figures.judging.expectations import Expectation, parse_expectation
     from odscen.formats.base import Format
+    from odscen.lanegraph.query import NearestNode
+    from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.learning.hetero_data import read_arrays
     from odscen.maps.importers.base import ImportedMap, ImportSettings, MapImporter
     from odscen.maps.map_entry import MapEntry
@@ -121,6 +123,9 @@ _HOMES = {
     "SpeedLaw": "odscen.scenario.story.motion_laws",
     "RunSettings": "odscen.runs.run_settings",
     "Recording": "odscen.runs.recording",
+    "BehaviourDoor": "odscen.learning.behaviour.behaviour_model",
+    "Expectation": "odscen.figures.judging.expectations",
+    "NearestNode": "odscen.lanegraph.query",
     "parse_expectation": "odscen.figures.judging.expectations",
     "run": "odscen.app.running.runs",
     "run_many": "odscen.app.running.batches",
@@ -155,11 +160,13 @@ _HOMES = {
 
 __all__ = [
     "ActionKind",
+    "BehaviourDoor",
     "ConditionKind",
     "ConflictError",
     "ConversionSettings",
     "Editing",
     "ElementOutcome",
+    "Expectation",
     "ExperimentPlan",
     "ExperimentResults",
     "Format",
@@ -171,6 +178,7 @@ __all__ = [
     "LimitError",
     "MapEntry",
     "MapImporter",
+    "NearestNode",
     "NotFoundError",
     "OdscenError",
     "Problem",

@@ -13,7 +13,6 @@ import shutil
 import zlib
 from contextlib import suppress
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.app.maps import map_of
@@ -21,7 +20,7 @@ from odscen.app.scenarios import SUFFIX, read_scenario, write_scenario
 from odscen.app.variants import apply_edit, edited
 from odscen.base.errors import ConflictError, InputError, NotFoundError
 from odscen.base.folder_locks import locked
-from odscen.base.given_files import read_given_text
+from odscen.base.given_files import as_path, is_path, read_given_text
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.maps.folder_names import check_name
@@ -39,7 +38,9 @@ from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
+    from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
 
@@ -192,16 +193,16 @@ class Editing:
     >>> editing.save()
     """
 
-    def __init__(self, workspace: Workspace, scenario: Scenario | Path) -> None:
+    def __init__(self, workspace: Workspace, scenario: Scenario | GivenPath) -> None:
         self._workspace = workspace
         self._file: Path | None = None
         self._folder: HistoryFolder | None = None
         self._documents: dict[HistoryEntry, str] = {}
         self._edits: dict[HistoryEntry, tuple[dict[str, Any], ...]] = {}
-        if isinstance(scenario, Path):
-            self._file = scenario
-            self._folder = self._history_folder(scenario)
-            self.scenario, text = _read_document(scenario)
+        if is_path(scenario):
+            self._file = as_path(scenario)
+            self._folder = self._history_folder(self._file)
+            self.scenario, text = _read_document(self._file)
         else:
             self.scenario, text = scenario, dumps(scenario)
         known = self._folder.read() if self._folder is not None else None
@@ -351,7 +352,7 @@ class Editing:
             raise ConflictError("there is nothing to redo")
         return self._move_in_history(+1)
 
-    def save(self, path: Path | None = None) -> Path:
+    def save(self, path: GivenPath | None = None) -> Path:
         """Write the scenario, and its history if it is among the scenarios of the workspace.
 
         Parameters
@@ -373,7 +374,7 @@ class Editing:
         WorkspaceError
             If it cannot be written.
         """
-        file = path or self._file
+        file = self._file if path is None else as_path(path)
         if file is None:
             raise InputError("the scenario has no file yet; name one")
         scenarios = self._workspace.scenarios / HISTORY

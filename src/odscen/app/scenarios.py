@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map, map_of
 from odscen.base.errors import InputError
-from odscen.base.given_files import read_given, read_given_text
+from odscen.base.given_files import as_path, is_path, read_given, read_given_text
 from odscen.base.text_files import write_text
 from odscen.figures.judging.criteria import criteria_problems
 from odscen.maps.folder_names import plain_name
@@ -20,8 +19,10 @@ from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, Generatio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+    from pathlib import Path
 
     from odscen.app.generators import GeneratorDoor
+    from odscen.base.given_files import GivenPath
     from odscen.learning.fill import CheckedFill
     from odscen.maps.store import Workspace
     from odscen.scenario.document.problems import Problem
@@ -31,7 +32,7 @@ SUFFIX = SCENARIO_SUFFIX
 """Ending of scenario files."""
 
 
-def read_scenario(path: Path) -> Scenario:
+def read_scenario(path: GivenPath) -> Scenario:
     """Read a scenario, as JSON document, in its graph form or as arrays.
 
     Parameters
@@ -51,10 +52,10 @@ def read_scenario(path: Path) -> Scenario:
     ScenarioError
         If it is not a scenario; names every problem with its place.
     """
-    return read_any(read_given(path), file=str(path))
+    return read_any(read_given(as_path(path)), file=str(path))
 
 
-def write_scenario(scenario: Scenario, path: Path) -> Path:
+def write_scenario(scenario: Scenario, path: GivenPath) -> Path:
     """Write a scenario, as JSON document.
 
     Parameters
@@ -76,6 +77,7 @@ def write_scenario(scenario: Scenario, path: Path) -> Path:
     WorkspaceError
         If it cannot be written.
     """
+    path = as_path(path)
     forms = {".graphml": ("the graph form is", "graphml"), ".npz": ("arrays are", "arrays")}
     if path.suffix in forms:
         what, to = forms[path.suffix]
@@ -105,23 +107,23 @@ def scenario_files(paths: Iterable[Path]) -> list[Path]:
     return found
 
 
-def scenario_name(scenario: Scenario | Path) -> str:
+def scenario_name(scenario: Scenario | GivenPath) -> str:
     """Name of a scenario's run folder: the file's name without its ending, or the scenario's."""
-    if not isinstance(scenario, Path):
+    if not is_path(scenario):
         return plain_name(scenario.name) or "scenario"
-    name = scenario.name
+    name = as_path(scenario).name
     for ending in (SUFFIX, ".json", ".graphml", ".npz"):
         if name.endswith(ending):
             return name.removesuffix(ending)
     return name
 
 
-def given_scenario(scenario: Scenario | Path) -> Scenario:
+def given_scenario(scenario: Scenario | GivenPath) -> Scenario:
     """Return a scenario, read if it is given as a file; errors of :func:`read_scenario`."""
-    return read_scenario(scenario) if isinstance(scenario, Path) else scenario
+    return read_scenario(scenario) if is_path(scenario) else scenario
 
 
-def check_scenario(workspace: Workspace, scenario: Scenario | Path) -> tuple[Problem, ...]:
+def check_scenario(workspace: Workspace, scenario: Scenario | GivenPath) -> tuple[Problem, ...]:
     """Find every problem of a scenario on its map; :mod:`odscen.scenario.checks` has the rules.
 
     What the SUMO network of the map does not hold of it are warnings:
@@ -182,7 +184,7 @@ def generate(
     workspace: Workspace,
     *,
     settings: GenerationSettings = ONE_SCENARIO,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     generator: GeneratorDoor | None = None,
     filled: Callable[[str, CheckedFill], None] | None = None,
     progress: Callable[[str, float], None] | None = None,
@@ -223,6 +225,7 @@ def generate(
     from odscen.scenario.sampling.sampler import choose_map, sample_scenario
     from odscen.sumo.realize.signals_ahead import lights_at_start
 
+    folder = workspace.scenarios if out is None else as_path(out)
     placer = None if generator is None else Placer(open_generator(generator))
     config, map_name = settings.sampling, settings.map_name
     statistics: dict[str, Any] = {}
@@ -255,7 +258,7 @@ def generate(
         )
         if filled is not None and placer is not None and placer.checked is not None:
             filled(title, placer.checked)
-        file = (out or workspace.scenarios) / f"{title}{SUFFIX}"
+        file = folder / f"{title}{SUFFIX}"
         paths.append(write_scenario(scenario, file))
     return paths
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.base.errors import ConflictError
+from odscen.base.given_files import as_path
 from odscen.maps.folder_names import check_name
 from odscen.scenario.templates.template_registry import TEMPLATES, find_template, place_template
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.templates.scene_template import SceneTemplate
@@ -87,7 +89,7 @@ def write_template(
     *,
     values: Mapping[str, float] | None = None,
     name: str | None = None,
-    out: Path | None = None,
+    out: GivenPath | None = None,
 ) -> Path:
     """Place a template on a map and write its scenario, into the workspace if not elsewhere.
 
@@ -100,7 +102,8 @@ def write_template(
     """
     scenario = template_scenario(workspace, template, map_name, values=values, name=name)
     check_name(scenario.name, what="scenario")
-    file = (out or workspace.scenarios) / f"{scenario.name}{SUFFIX}"
+    folder = workspace.scenarios if out is None else as_path(out)
+    file = folder / f"{scenario.name}{SUFFIX}"
     if file.exists():
         raise ConflictError(f"{file} is there already; give the scenario another name")
     return write_scenario(scenario, file)

@@ -1,18 +1,43 @@
-"""Reading files that users name: regular files of a sensible size only."""
+"""Files that users name: paths as they write them, and content of a sensible size only."""
 
 from __future__ import annotations
 
+import os
 import stat
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TypeAlias
+
+from typing_extensions import TypeIs
 
 from odscen.base.errors import InputError
 from odscen.base.shown import printable
 
-if TYPE_CHECKING:
-    from pathlib import Path
+GivenPath: TypeAlias = str | os.PathLike[str]
+"""A path as people write it."""
 
 MOST = 256_000_000
 """Bytes; a scenario of 200,000 actors has a fifth of it."""
+
+
+def as_path(given: GivenPath) -> Path:
+    """Path of what the public functions are given; ``~`` is the home folder.
+
+    Raises
+    ------
+    InputError
+        If it is neither text nor a path.
+    """
+    try:
+        return Path(given).expanduser()
+    except TypeError as error:
+        raise InputError(f"a path is text or a pathlib.Path, not {given!r}") from error
+    except RuntimeError as error:  # there is no such user
+        raise InputError(str(error), file=printable(str(given))) from error
+
+
+def is_path(given: object) -> TypeIs[GivenPath]:
+    """Whether something is a path, rather than what would be read from it."""
+    return isinstance(given, str | os.PathLike)
 
 
 def read_given(file: Path, *, most: int = MOST) -> bytes:

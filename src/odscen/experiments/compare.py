@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.app.maps import load_map
 from odscen.app.running.confident_runs import FIGURE, confidence_of
 from odscen.base.errors import InputError, ScenarioError, in_file
+from odscen.base.given_files import as_path
 from odscen.experiments.measure import FigureKey, measure
 from odscen.figures.measures.comparison import CONFIDENCE, compare_figure
 from odscen.figures.measures.registry import SEGMENT_FIGURES
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.base.given_files import GivenPath
     from odscen.experiments.measure import Measured
     from odscen.figures.measures.comparison import Difference, Finding
     from odscen.maps.store import Workspace
@@ -191,7 +193,9 @@ def _difference_row(row: Row) -> dict[str, Any]:
     return {**key, "unit": row.key.entry.unit, **found}
 
 
-def compare(a: Run | Path, b: Run | Path, *, workspace: Workspace | None = None) -> RunComparison:
+def compare(
+    a: Run | GivenPath, b: Run | GivenPath, *, workspace: Workspace | None = None
+) -> RunComparison:
     """Compare runs: every figure of both sides, with 95 % intervals where there are several seeds.
 
     Parameters
@@ -215,8 +219,8 @@ def compare(a: Run | Path, b: Run | Path, *, workspace: Workspace | None = None)
     -----
     Runs of the same seeds are compared in pairs; intervals are Student's t.
     """
-    one, other = (side.folder if isinstance(side, Run) else side for side in (a, b))
-    return compare_runs(read_runs(one, workspace), read_runs(other, workspace))
+    folders = [side.folder if isinstance(side, Run) else as_path(side) for side in (a, b)]
+    return compare_runs(*(read_runs(folder, workspace) for folder in folders))
 
 
 def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, OdscenError
+from odscen.base.given_files import as_path
 from odscen.base.text_files import write_file
 from odscen.changes.map_differences import map_differences
 from odscen.experiments.baseline import (
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.running.runs import CheckedRun
+    from odscen.base.given_files import GivenPath
     from odscen.changes.map_change import MapChange
     from odscen.experiments.baseline import Baseline
     from odscen.experiments.measure import Measured
@@ -272,7 +274,7 @@ def run_suite(
     *,
     processes: int = 1,
     update: Update = NO_UPDATE,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     progress: Callable[[str, float], None] | None = None,
     parts: Mapping[str, RunCase] | None = None,
 ) -> SuiteResult:
@@ -321,7 +323,7 @@ def run_suite(
             _refuse_given_seeds(suite)
         with scratch_folder() as temporary:
             runner = SeedRunner(suite, LocalExecutor(workspace, processes), progress)
-            place = RunPlace(out or temporary, keep=out is not None)
+            place = RunPlace(temporary if out is None else as_path(out), keep=out is not None)
             if update.wanted:
                 aside = RunPlace(temporary / "changed", keep=False)
                 choose_seeds(loaded, runner, place, aside)

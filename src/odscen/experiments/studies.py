@@ -33,6 +33,7 @@ from odscen.base.checksums import (
 )
 from odscen.base.errors import ConflictError, InputError, in_file
 from odscen.base.folder_locks import is_locked, locked
+from odscen.base.given_files import as_path
 from odscen.base.stored_files import documents, read_document
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.base.given_files import GivenPath
     from odscen.experiments.journal import Rows
     from odscen.experiments.plan import StudyGrid, StudyRun
     from odscen.experiments.work import Executor, Outcome
@@ -310,9 +312,9 @@ def extend_study(
 
 def run_experiment(
     workspace: Workspace,
-    out: Path,
+    out: GivenPath,
     *,
-    plan: StudyPlan | Path,
+    plan: StudyPlan | GivenPath,
     processes: int = 1,
     done: Callable[[int, int], None] | None = None,
 ) -> EndedStudy:
@@ -344,16 +346,17 @@ def run_experiment(
     ConflictError
         If another study is in the folder, or another process works on it.
     """
-    if isinstance(plan, Path):
-        begin_study(workspace, plan, out)
+    folder = as_path(out)
+    if isinstance(plan, StudyPlan):
+        begin_study_of(workspace, plan, folder, beside=Path())
     else:
-        begin_study_of(workspace, plan, out, beside=Path())
-    return carry_out_study(out, LocalExecutor(workspace, processes), done=done)
+        begin_study(workspace, as_path(plan), folder)
+    return carry_out_study(folder, LocalExecutor(workspace, processes), done=done)
 
 
 def resume_experiment(
     workspace: Workspace,
-    out: Path,
+    out: GivenPath,
     *,
     processes: int = 1,
     failed: bool = False,
@@ -386,7 +389,8 @@ def resume_experiment(
     ConflictError
         If another process works on it, or another odscen has begun it.
     """
-    return carry_out_study(out, LocalExecutor(workspace, processes), again=failed, done=done)
+    executor = LocalExecutor(workspace, processes)
+    return carry_out_study(as_path(out), executor, again=failed, done=done)
 
 
 def carry_out_study(
@@ -524,7 +528,7 @@ def study_state(out: Path) -> StudyState:
     return _study_state(out, read_study(out), read_rows(out), active=is_locked(out))
 
 
-def study_results(out: Path) -> EndedStudy:
+def study_results(out: GivenPath) -> EndedStudy:
     """Read the table of a study, of all runs that have ended by now.
 
     Parameters
@@ -542,8 +546,9 @@ def study_results(out: Path) -> EndedStudy:
     InputError
         If there is no study.
     """
-    grid, rows = read_study(out), read_rows(out)
-    state = _study_state(out, grid, rows, active=is_locked(out))
+    folder = as_path(out)
+    grid, rows = read_study(folder), read_rows(folder)
+    state = _study_state(folder, grid, rows, active=is_locked(folder))
     return EndedStudy(state, study_table(grid, rows))
 
 

@@ -19,7 +19,7 @@ from pydantic import (
 
 from odscen.app.scenarios import scenario_name
 from odscen.base.errors import InputError, ScenarioError, in_file
-from odscen.base.given_files import read_given_text
+from odscen.base.given_files import as_path, read_given_text
 from odscen.experiments.own_figures import FigureEntry, FigureName, declared, refuse_tolerances
 from odscen.experiments.tolerance import (
     FEWEST_SEEDS,
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.experiments.baseline import Baseline, Fingerprint
     from odscen.experiments.measure import Measured
@@ -232,7 +233,7 @@ def missing_case(baseline: Path) -> Case:
     return Case(baseline.stem, baseline, (), (), Tolerances({}), None, None, baseline)
 
 
-def read_suite(file: Path) -> Suite:
+def read_suite(file: GivenPath) -> Suite:
     """Read a suite; paths in it are relative to the file.
 
     Parameters
@@ -252,6 +253,7 @@ def read_suite(file: Path) -> Suite:
     ScenarioError
         If it is not a suite; names every key at fault.
     """
+    file = as_path(file)
     try:
         data = tomllib.loads(read_given_text(file))
     except (ValueError, RecursionError) as error:

@@ -7,13 +7,14 @@ regions of interest (requirements R29 and R31).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from odscen.base.errors import NotFoundError
+from odscen.base.errors import InputError, NotFoundError
 from odscen.base.ids import LaneKey, NodeId, RoadId, SegmentId
 
 if TYPE_CHECKING:
@@ -73,6 +74,62 @@ def node_index(graph: MapGraph, name: str) -> int:
     """
     lanes = graph.lanes.lanes
     return _index_on_lane(name, name, lanes.keys, lanes.first_node)
+
+
+class NearestNode(NamedTuple):
+    """The lane-graph node nearest to a place.
+
+    Attributes
+    ----------
+    id
+        As spawns and goals name it.
+    x, y, z
+        Where it is, metres in the OpenDRIVE frame.
+    hdg
+        Driving direction there, rad counter-clockwise from x.
+    distance
+        From the place, metres in the plane.
+    """
+
+    id: NodeId
+    x: float
+    y: float
+    z: float
+    hdg: float
+    distance: float
+
+
+HEADING_TOLERANCE = math.pi / 4
+"""A lane whose direction differs by more is another one: it crosses, or is the opposite one."""
+
+
+def nearest_node(graph: MapGraph, x: float, y: float, hdg: float | None = None) -> NearestNode:
+    """Find the lane-graph node nearest to a place; of those as near the first.
+
+    Parameters
+    ----------
+    x, y
+        Metres in the OpenDRIVE frame.
+    hdg
+        Direction of driving, rad counter-clockwise from x: only nodes within 45 degrees of it.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite, or the map has no lane in that direction.
+    """
+    lanes = graph.lanes
+    if not all(map(math.isfinite, (x, y, 0.0 if hdg is None else hdg))):
+        raise InputError(f"a place is of finite numbers, not ({x}, {y}, {hdg})")
+    squares = (lanes.x - x) ** 2 + (lanes.y - y) ** 2
+    if hdg is not None:
+        turn = np.abs(np.remainder(lanes.hdg - hdg + np.pi, 2.0 * np.pi) - np.pi)
+        squares = np.where(turn <= HEADING_TOLERANCE, squares, np.inf)
+    if not np.isfinite(squares).any():
+        raise InputError(f"map {graph.map_name!r} has no lane in the direction of {hdg:g} rad")
+    row = int(np.argmin(squares))
+    at = (float(lanes.x[row]), float(lanes.y[row]), float(lanes.z[row]), float(lanes.hdg[row]))
+    return NearestNode(node_id(graph, row), *at, math.sqrt(float(squares[row])))
 
 
 def walk_node_id(graph: MapGraph, i: int) -> NodeId:

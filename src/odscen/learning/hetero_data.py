@@ -13,22 +13,22 @@ import numpy as np
 
 from odscen.base.errors import InputError
 from odscen.base.given_arrays import MOST_UNPACKED, arrays_from_npz
-from odscen.base.given_files import read_given
+from odscen.base.given_files import as_path, read_given
 from odscen.lanegraph.graphs import Relation, WalkKind
 from odscen.learning.scenario_hetero_data import scenario_arrays_of, scenario_hetero_data
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
     from odscen.base.arrays import FloatArray
     from odscen.base.given_arrays import Array
+    from odscen.base.given_files import GivenPath
 
 _KNOWN = {"odscen-arrays": 1, "odscen-scenario-arrays": 1}
 """Formats of arrays, of a run and of a scenario, and their versions."""
 
 
-def read_arrays(path: Path) -> dict[str, Array]:
+def read_arrays(path: GivenPath) -> dict[str, Array]:
     """Read the arrays of a run or of a scenario, as ``odscen export`` wrote them.
 
     Nothing in the file is run; each array has the size that its header says.
@@ -49,7 +49,7 @@ def read_arrays(path: Path) -> dict[str, Array]:
         If the file cannot be read, is no such file or one of another version, or has a malformed
         array; names it.
     """
-    arrays = arrays_from_npz(read_given(path, most=MOST_UNPACKED), file=str(path))
+    arrays = arrays_from_npz(read_given(as_path(path), most=MOST_UNPACKED), file=str(path))
     known = _format_and_version(arrays)
     if known is None:
         raise InputError("these are no arrays of a run or a scenario", file=str(path))

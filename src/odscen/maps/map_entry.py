@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.lanegraph.graphs import MapGraph
     from odscen.lanegraph.map_statistics import MapStatistics
+    from odscen.lanegraph.query import NearestNode
     from odscen.maps.converters import GivenNetwork
 
 INFO_FILE = "map.json"
@@ -57,6 +58,14 @@ class MapEntry:
     def __eq__(self, other: object) -> bool:
         """Equal if it is the same build of the same map."""
         return isinstance(other, MapEntry) and self._cache_key == other._cache_key
+
+    def __repr__(self) -> str:
+        """Name and place: ``info`` has tens of kilobytes."""
+        return f"<Map {self.name}: {self.folder}>"
+
+    def _repr_svg_(self) -> str:
+        """Picture of the map, for notebooks."""
+        return self.read("preview").decode("utf-8")
 
     def __hash__(self) -> int:
         """Hash of the same."""
@@ -153,6 +162,30 @@ class MapEntry:
         from odscen.lanegraph.graph_files import from_npz_bytes
 
         return from_npz_bytes(self.read("graph_npz"))
+
+    def nearest(self, x: float, y: float, hdg: float | None = None) -> NearestNode:
+        """Find the node of the lane graph nearest to a place, for spawns and goals.
+
+        Parameters
+        ----------
+        x, y
+            Metres in the OpenDRIVE frame.
+        hdg
+            Direction of driving, rad counter-clockwise from x: only lanes within 45 degrees of it.
+
+        Returns
+        -------
+        NearestNode
+            ``id``, ``x``, ``y``, ``z``, ``hdg`` and ``distance`` (m).
+
+        Raises
+        ------
+        InputError
+            If a number is not finite, or the map has no lane in that direction.
+        """
+        from odscen.lanegraph.query import nearest_node
+
+        return nearest_node(self.graph(), x, y, hdg)
 
     def networkx(self) -> tuple[nx.MultiDiGraph, nx.Graph]:
         """Lane graph and pedestrian graph, see :func:`odscen.lanegraph.networkx_form.to_networkx`.

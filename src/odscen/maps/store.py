@@ -11,14 +11,13 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.checksums import digest, sums_of, write_sums
 from odscen.base.errors import DamagedError, InputError, NotFoundError, OdscenError, in_file
 from odscen.base.folder_locks import locked
-from odscen.base.given_files import read_given
+from odscen.base.given_files import as_path, read_given
 from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
@@ -31,7 +30,9 @@ from odscen.simulators.assets import assets_in
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
+    from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.maps.allowances import BuildLimits
     from odscen.maps.converters import GivenNetwork
     from odscen.maps.importers.base import ImportSettings
@@ -86,7 +87,7 @@ class Workspace:
     root: Path
 
     @classmethod
-    def open(cls, root: Path | None = None) -> Workspace:
+    def open(cls, root: GivenPath | None = None) -> Workspace:
         """Open the workspace at ``root``, else ``$ODSCEN_WORKSPACE``, else the user's data folder.
 
         Raises
@@ -95,19 +96,17 @@ class Workspace:
             If it cannot be created or written.
         """
         if root is None:
-            given = os.environ.get(ENVIRONMENT_VARIABLE)
-            if given:
-                root = Path(given)
-            else:
+            root = os.environ.get(ENVIRONMENT_VARIABLE)
+            if not root:
                 from platformdirs import user_data_path
 
                 root = user_data_path("odscen", appauthor=False)
-        root = root.expanduser().absolute()
-        with _workspace_errors(root):
-            (root / "maps").mkdir(parents=True, exist_ok=True)
-        for folder in (root / "maps", root / "runs"):
+        own = as_path(root).absolute()
+        with _workspace_errors(own):
+            (own / "maps").mkdir(parents=True, exist_ok=True)
+        for folder in (own / "maps", own / "runs"):
             clear_leftovers(folder)
-        return cls(root)
+        return cls(own)
 
     @property
     def scenarios(self) -> Path:
@@ -266,7 +265,7 @@ class Workspace:
 
     def add_map(
         self,
-        source: Path,
+        source: GivenPath,
         *,
         name: str | None = None,
         settings: ConversionSettings = USUAL,
@@ -308,10 +307,11 @@ class Workspace:
         WorkspaceError
             If the workspace cannot be written.
         """
-        name = check_name(name_from_file(source) if name is None else name)
+        file = as_path(source)
+        name = check_name(name_from_file(file) if name is None else name)
         return self.add_map_content(
-            read_map_file(source),
-            file=source.name,
+            read_map_file(file),
+            file=file.name,
             name=name,
             settings=settings,
             importing=importing,
@@ -352,7 +352,7 @@ class Workspace:
     def set_network(
         self,
         name: str,
-        source: Path,
+        source: GivenPath,
         *,
         limits: BuildLimits = BY_SIZE,
         progress: ProgressCallback | None = None,
@@ -382,7 +382,8 @@ class Workspace:
         from odscen.maps.converters import GivenNetwork
 
         entry = self.map(name)
-        given = GivenNetwork(read_given(source), source.name)
+        network = as_path(source)
+        given = GivenNetwork(read_given(network), network.name)
         settings = replace(entry.conversion, converter="file")
         content, file = entry.read(entry.source_key), str(entry.info["source"])
         with _workspace_errors(self.root), self._lock_map(name):

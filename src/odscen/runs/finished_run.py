@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Literal, Self, get_args, get_type_hints
 
 from odscen.base.errors import InputError, NotFoundError, in_file
+from odscen.base.given_files import as_path
 from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.figures.measures.figure import Basis, SummaryPart
 from odscen.figures.measures.registry import names_of, run_figure
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.base.given_files import GivenPath
     from odscen.figures.by_place.traffic import TableName
     from odscen.figures.measures.figure import RunFigure
 
@@ -68,7 +70,7 @@ class Run:
     known: Mapping[str, Any]
 
     @classmethod
-    def open(cls, folder: Path) -> Self:
+    def open(cls, folder: GivenPath) -> Self:
         """Open the folder of a run that has ended.
 
         Raises
@@ -78,7 +80,8 @@ class Run:
         DamagedError
             If a file of it is not as it was written; its report is not looked at.
         """
-        return cls(folder, checked_summary(folder, leave=(layout.REPORT_FILE,)))
+        opened = as_path(folder)
+        return cls(opened, checked_summary(opened, leave=(layout.REPORT_FILE,)))
 
     @property
     def summary(self) -> Mapping[str, Any]:

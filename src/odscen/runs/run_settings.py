@@ -29,7 +29,15 @@ _LONGEST = 1e9
 """Seconds that a run may last, as in the document."""
 
 
+def _refuse_other_type(name: str, value: object, kinds: type | tuple[type, ...], need: str) -> None:
+    """Refuse a value that a type checker would have refused: it would fail later, and elsewhere."""
+    if value is None or (isinstance(value, kinds) and not isinstance(value, bool)):
+        return
+    raise InputError(f"{name} must be {need}, not {value!r}")
+
+
 def _refuse_time(name: str, seconds: float | None, *, most: float = math.inf) -> None:
+    _refuse_other_type(name, seconds, (int, float), "a number of seconds")
     if seconds is not None and not (0 < seconds <= most and math.isfinite(seconds)):
         limit = f" and at most {most:g}" if math.isfinite(most) else ""
         raise InputError(f"{name} must be above 0{limit} s, not {seconds:g}")
@@ -99,6 +107,15 @@ class RunSettings:
     simulator_options: Mapping[str, OptionValue] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        _refuse_other_type("seed", self.seed, int, "a whole number")
+        _refuse_other_type("recording", self.recording, Recording, "an odscen.Recording")
+        need = "a BehaviourDoor, such as BehaviourDoor(name='idm')"
+        _refuse_other_type("behaviour", self.behaviour, BehaviourDoor, need)
+        if isinstance(self.expectations, str):
+            raise InputError("expectations must be a tuple, not a single text")
+        for expectation in self.expectations:
+            made = f"made by odscen.parse_expectation({expectation!r})"
+            _refuse_other_type("an expectation", expectation, Expectation, made)
         if self.seed is not None and not 0 <= self.seed < _SEEDS:
             raise InputError(f"seed must lie between 0 and {_SEEDS - 1}, not {self.seed}")
         if self.redraw not in REDRAWS:
@@ -109,6 +126,7 @@ class RunSettings:
             _refuse_time("slice_length", self.slice_length)
         _refuse_time("time_limit", self.time_limit)
         for name, seconds in (("warm_up", self.warm_up), ("interval", self.interval)):
+            _refuse_other_type(name, seconds, (int, float), "whole seconds")
             if seconds is not None and (seconds < 0 or seconds % 1.0 or not math.isfinite(seconds)):
                 raise InputError(f"{name} must be whole seconds, not {seconds:g}")
         _refuse_time("interval", self.interval)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, in_file
+from odscen.base.given_files import as_path, is_path
 from odscen.base.system_errors import disk_errors
 from odscen.formats import find_format, list_formats
 from odscen.formats.base import NOTES_SUFFIX
@@ -21,6 +22,7 @@ from odscen.formats.base import NOTES_SUFFIX
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from odscen.base.given_files import GivenPath
     from odscen.formats.base import ExportFiles, ExportSource, Format, RecordedRun
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
@@ -32,8 +34,8 @@ _DATE: Final = (2026, 1, 1, 0, 0, 0)
 
 def export(
     workspace: Workspace,
-    scenario: Scenario | Path,
-    out: Path,
+    scenario: Scenario | GivenPath,
+    out: GivenPath,
     *,
     to: str,
     options: Mapping[str, str] | None = None,
@@ -80,20 +82,20 @@ def export(
     if "scenario" not in chosen.of or chosen.write is None:
         raise InputError(
             f"the format {to} says what happened in a run: name the folder of one",
-            file=str(scenario) if isinstance(scenario, Path) else None,
+            file=str(scenario) if is_path(scenario) else None,
         )
     document = given_scenario(scenario)
     if chosen.checked:
-        with in_file(str(scenario)) if isinstance(scenario, Path) else nullcontext():
+        with in_file(str(scenario)) if is_path(scenario) else nullcontext():
             refuse_errors(check_scenario(workspace, document))
     source = _make_source(workspace, document, name or scenario_name(scenario), options)
-    return _write_files(chosen.write(source), out)
+    return _write_files(chosen.write(source), as_path(out))
 
 
 def export_run(
     workspace: Workspace,
-    run: Path,
-    out: Path,
+    run: GivenPath,
+    out: GivenPath,
     *,
     to: str,
     options: Mapping[str, str] | None = None,
@@ -144,22 +146,23 @@ def export_run(
         )
         raise InputError(f"the format {to} cannot say what happened in a run; {able} can")
     opened = Run.open(run)
+    folder = opened.folder
     recorded = _read_recorded(opened)
     seed = opened.known["seed"]  # perhaps another one than the scenario's own
-    document = read_scenario(run / SCENARIO_FILE).model_copy(update={"seed": seed})
-    source = _make_source(workspace, document, run.resolve().name, options, recorded)
+    document = read_scenario(folder / SCENARIO_FILE).model_copy(update={"seed": seed})
+    source = _make_source(workspace, document, folder.resolve().name, options, recorded)
     if chosen.needs_roads:
         from odscen.opendrive.parse import parse
 
         file = source.map_file
         source = replace(source, roads=parse(file.read_bytes(), file=file.name))
-    return _write_files(chosen.write(source), out)
+    return _write_files(chosen.write(source), as_path(out))
 
 
 def export_runs(
     workspace: Workspace,
-    folder: Path,
-    out: Path,
+    folder: GivenPath,
+    out: GivenPath,
     *,
     to: str,
     options: Mapping[str, str] | None = None,
@@ -171,6 +174,7 @@ def export_runs(
     """
     from odscen.runs.layout import SUMMARY_FILE
 
+    folder, out = as_path(folder), as_path(out)
     inside = sorted(path.parent for path in folder.glob(f"*/{SUMMARY_FILE}"))
     if (folder / SUMMARY_FILE).is_file() or not inside:
         return export_run(workspace, folder, out, to=to, options=options)

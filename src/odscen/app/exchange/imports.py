@@ -11,7 +11,7 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import check_scenario, write_scenario
 from odscen.base.checksums import digest
 from odscen.base.errors import InputError, NotFoundError
-from odscen.base.given_files import MOST, read_given
+from odscen.base.given_files import MOST, as_path, read_given
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.formats import find_format, format_of_file
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.base.given_files import GivenPath
     from odscen.formats.base import FileContent, GivenFile, ReportRow
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
@@ -67,11 +68,11 @@ class ImportedFile(NamedTuple):
 
 def import_file(
     workspace: Workspace,
-    path: Path,
+    path: GivenPath,
     *,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     of: str | None = None,
-    maps: Path | None = None,
+    maps: GivenPath | None = None,
     on_map: str | None = None,
     options: Mapping[str, str] | None = None,
 ) -> ImportedFile:
@@ -119,10 +120,13 @@ def import_file(
     WorkspaceError
         If a file cannot be written.
     """
+    path = as_path(path)
+    out = None if out is None else as_path(out)
+    more_maps = None if maps is None else as_path(maps)
     entry = None if on_map is None else _map_of_name_or_file(workspace, on_map)
 
     def find_map(named: str, file: GivenFile) -> MapEntry:
-        return entry or _map_beside(workspace, Path(file.where), maps, named)
+        return entry or _map_beside(workspace, Path(file.where), more_maps, named)
 
     content = read_content(
         workspace,

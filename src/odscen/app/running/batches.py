@@ -27,9 +27,9 @@ from odscen.sumo.runner.run_folder import SumoPreparedRun
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from concurrent.futures import Future
-    from pathlib import Path
 
     from odscen.app.running.runs import CheckedRun
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
     from odscen.runs.run_settings import RunSettings
@@ -144,11 +144,11 @@ def run_all(
 
 def run_many(
     workspace: Workspace,
-    scenarios: Sequence[Scenario | Path],
+    scenarios: Sequence[Scenario | GivenPath],
     *,
     settings: RunSettings = AS_DESIGNED,
     seeds: Sequence[int] | None = None,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     overwrite: bool = False,
     processes: int = 1,
     reports: bool = True,

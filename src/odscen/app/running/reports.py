@@ -10,6 +10,7 @@ import polars as pl
 
 from odscen.app.maps import load_map
 from odscen.base.errors import InputError, NotFoundError, in_file
+from odscen.base.given_files import as_path
 from odscen.base.stored_files import tables
 from odscen.base.text_files import write_text
 from odscen.figures.by_place.analysis_times import AnalysisTimes
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.figures.by_place.corridors import Corridor
     from odscen.figures.by_place.parking_use import ParkingUse
     from odscen.figures.by_place.traffic import TrafficFigures
@@ -162,11 +164,11 @@ def _read_lights(folder: Path) -> LightsOfRun | None:
 
 def renew_report(
     workspace: Workspace,
-    run: Run | Path,
+    run: Run | GivenPath,
     *,
     corridor: Sequence[str] = (),
     ends: tuple[str, str] | None = None,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     warm_up: float | None = None,
     interval: float | None = None,
 ) -> Path:
@@ -204,10 +206,11 @@ def renew_report(
         If a file of the run is not as it was written; that of the report is reported only.
     """
     folder = _folder_of(workspace, run)
+    file = None if out is None else as_path(out)
     _read_completed_summary(
         folder
     )  # which may have figures computed, and takes the run's lock for that
-    own = out is None and not unfinished(folder)
+    own = file is None and not unfinished(folder)
     with run_lock(folder) if own else nullcontext():
         summary = _read_completed_summary(folder)
         loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
@@ -217,16 +220,17 @@ def renew_report(
         data = None
         if (warm_up, interval) != (None, None):
             summary, data = _analyse_run(folder, summary, warm_up=warm_up, interval=interval)
-        report = write_report(folder, summary, loaded=loaded, corridor=along, out=out, data=data)
-        if out is None:
+        report = write_report(folder, summary, loaded=loaded, corridor=along, out=file, data=data)
+        if file is None:
             seal_again(folder, layout.REPORT_FILE)
     return report
 
 
-def _folder_of(workspace: Workspace, run: Run | Path) -> Path:
+def _folder_of(workspace: Workspace, run: Run | GivenPath) -> Path:
     if isinstance(run, Run):
         return run.folder
-    folder = run if run.is_dir() else workspace.runs / run
+    own = as_path(run)
+    folder = own if own.is_dir() else workspace.runs / own
     if not folder.is_dir():
         names = [path.name for path in workspace.runs.glob("*")]
         raise NotFoundError("run", str(run), names)

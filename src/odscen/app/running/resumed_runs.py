@@ -9,6 +9,7 @@ from odscen.app.maps import load_map
 from odscen.app.removal import removed_map
 from odscen.app.running.reports import write_report
 from odscen.base.errors import InputError
+from odscen.base.given_files import as_path
 from odscen.runs.reporter import SILENT
 from odscen.sumo.runner import long_runs
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 
 def resume(
     workspace: Workspace,
-    run: Path,
+    run: GivenPath,
     *,
     time_limit: float | None = None,
     reporter: Reporter = SILENT,
@@ -71,7 +73,8 @@ def resume(
         entry = entry or removed_map(workspace, summary["map_sha256"])
         write_report(folder, summary, loaded=None if entry is None else load_map(entry))
 
-    folder = run if run.is_dir() else workspace.runs / run
+    own = as_path(run)
+    folder = own if own.is_dir() else workspace.runs / own
     result = long_runs.resume(
         folder,
         reporter=reporter,

@@ -11,12 +11,12 @@ from __future__ import annotations
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import InputError, OdscenError, in_file
+from odscen.base.given_files import as_path, is_path
 from odscen.figures.judging.criteria import criteria_problems
 from odscen.runs.new_run import (
     SimulationOutcome,
@@ -37,8 +37,10 @@ from odscen.sumo.runner.sumo_simulator import SumoSimulator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
@@ -102,7 +104,7 @@ def check_run(
     scenario: Scenario,
     *,
     name: str,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     settings: RunSettings = AS_DESIGNED,
     entry: MapEntry | None = None,
     simulator: AnySimulator | None = None,
@@ -142,7 +144,7 @@ def check_run(
     refuse_errors((*found, *criteria_problems(scenario)))
     unsupported = unsupported_parts(simulator, scenario, run_map(entry, assets))
     refuse_errors(unsupported)
-    folder = (out or workspace.runs) / name
+    folder = (workspace.runs if out is None else as_path(out)) / name
     return CheckedRun(name, scenario, entry, assets, folder, settings, simulator, unsupported)
 
 
@@ -178,10 +180,10 @@ def _name_simulator_in_errors(simulator: AnySimulator) -> Iterator[None]:
 
 def check_file(
     workspace: Workspace,
-    path: Path,
+    path: GivenPath,
     *,
     name: str | None = None,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     settings: RunSettings = AS_DESIGNED,
     simulator: AnySimulator | None = None,
 ) -> CheckedRun:
@@ -322,16 +324,16 @@ def _run_simulator(
 
 def check_given(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
     name: str | None = None,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     settings: RunSettings = AS_DESIGNED,
     simulator: AnySimulator | None = None,
 ) -> CheckedRun:
     """Check a scenario, or its file; parameters and errors of :func:`check_run`, `check_file`."""
     name = name or scenario_name(scenario)
-    if isinstance(scenario, Path):
+    if is_path(scenario):
         return check_file(
             workspace, scenario, name=name, out=out, settings=settings, simulator=simulator
         )
@@ -342,12 +344,12 @@ def check_given(
 
 def run(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
     settings: RunSettings = AS_DESIGNED,
     simulator: str | AnySimulator | None = None,
     name: str | None = None,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     overwrite: bool = False,
     reporter: Reporter = SILENT,
 ) -> Run:

@@ -26,9 +26,9 @@ from odscen.sumo.runner.in_step import InStep
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
     from odscen.app.running.runs import CheckedRun
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
     from odscen.runs.run_settings import RunSettings
@@ -188,11 +188,11 @@ class WatchedRun:
 @contextmanager
 def watch(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
     settings: RunSettings = AS_DESIGNED,
     name: str | None = None,
-    out: Path | None = None,
+    out: GivenPath | None = None,
     overwrite: bool = False,
 ) -> Iterator[WatchedRun]:
     """Run a scenario, see every step of it, and act in it; SUMO waits for the loop.

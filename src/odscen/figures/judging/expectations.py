@@ -76,9 +76,20 @@ _PATTERN = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """One expectation; ``share`` if the value is divided by the number of planned actors first.
+    """One expectation, as :func:`parse_expectation` reads it.
 
-    ``actor`` is the id of the one that it is about, or ``ego``; ``None`` for the whole run.
+    Attributes
+    ----------
+    text
+        As it was written.
+    name
+        Of the figure.
+    op, bound
+        Comparison, such as ``>=``, and number, in SI.
+    share
+        Whether the value is divided by the number of planned actors first.
+    actor
+        Id of the one that it is about, or ``ego``; ``None`` for the whole run.
     """
 
     text: str

@@ -651,6 +651,15 @@ class Scenario(Part):
     parameters: dict[ParameterName, Parameter] = Field(default_factory=dict, max_length=200)
     formulas: dict[str, str] = Field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """What a person asks first; the whole has tens of kilobytes: ``model_dump()`` has it."""
+        counts = {"actor": self.actors, "flow": self.flows, "rule": self.rules}
+        parts = [f"{len(of)} {what}{'s'[: len(of) != 1]}" for what, of in counts.items() if of]
+        what = ", ".join([*parts, f"{self.simulation.duration:g} s"])
+        return f"<Scenario {self.name} on {self.map.name}: {what}>"
+
+    __str__ = __repr__
+
     @model_validator(mode="after")
     def _fine_steps(self) -> Self:
         """With rules, steps are short unless the document says how long."""
