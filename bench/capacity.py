@@ -6,7 +6,9 @@ join places on driving lanes outside junctions, drawn with a fixed seed from the
 level is trips per hour and kilometre of lane. Delay is SUMO's time loss and insertion delay, the
 time until the end for those that never entered; the time of a trip is that of those that arrived.
 ``ODSCEN_BENCH_LEVELS`` (100,300,500) and ``ODSCEN_BENCH_SEEDS`` (1,2) widen or narrow it,
-``ODSCEN_BENCH_MAPS`` names the maps.
+``ODSCEN_BENCH_MAPS`` names the maps, also those that ``tools/make_maps`` makes on demand;
+``ODSCEN_BENCH_SECONDS`` ends an hour earlier, and ``ODSCEN_BENCH_LIGHTS`` is ``on`` to leave out
+runs with all lights off and bare maps.
 
 Collisions are counted inside junctions, too.
 
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 HOUR = 3600.0
+END = float(os.environ.get("ODSCEN_BENCH_SECONDS", HOUR))
+ONLY_ON = os.environ.get("ODSCEN_BENCH_LIGHTS") == "on"
 SPACING = 2.0
 FROM_ENDS = 15.0
 NARROWEST = 2.5
@@ -85,10 +89,11 @@ def main() -> None:
     )
     print("|---|---|---|---|---|---|---|---|")
     ratios = []
-    for path in _maps():
+    for name in _maps():
         with tempfile.TemporaryDirectory() as folder:
+            path = name if isinstance(name, Path) else _made_map(name, Path(folder))
             versions = _versions(path, Path(folder))
-            for file, label in versions:
+            for file, label in versions[: 1 if ONLY_ON else None]:
                 ruled = len(versions) > 1 and file == path
                 try:
                     bench = _MapBench(file, Path(folder), label, places=path, ruled=ruled)
@@ -133,12 +138,26 @@ def _versions(path: Path, folder: Path) -> list[tuple[Path, str]]:
     return [(path, label), (bare, f"{label}, bare")]
 
 
-def _maps() -> list[Path]:
+def _made_map(name: str, folder: Path) -> Path:
+    from tools.make_maps.__main__ import map_text
+
+    path = folder / "maps" / f"{name}.xodr"
+    path.parent.mkdir()
+    path.write_text(map_text(name), encoding="utf-8", newline="\n")
+    return path
+
+
+def _maps() -> list[Path | str]:
+    """Files of maps, and names of those that are made."""
     own = sorted((Path(__file__).parents[1] / "maps").glob("*.xodr"))
     shared = shared_maps()
     found = own + (sorted(shared.rglob("*.xodr")) if shared else [])
     names = os.environ.get("ODSCEN_BENCH_MAPS", "")
-    return [path for path in found if not names or path.stem in names.split(",")]
+    if not names:
+        return [*found]
+    known = {path.stem for path in found}
+    made = [name for name in names.split(",") if name not in known]
+    return [*(path for path in found if path.stem in names.split(",")), *made]
 
 
 class _MapBench:
@@ -182,7 +201,7 @@ class _MapBench:
             self._nets["ours"].getTrafficLights() or self._nets["netconvert"].getTrafficLights()
         )
         ratios = []
-        modes = ["on", "off"] if lit else ["none"]
+        modes = ["on", "off"][: 1 if ONLY_ON else None] if lit else ["none"]
         if lit and level == HIGH_LEVELS.get(self._label, (0,))[-1]:
             self._walks()
             modes.append(WALKED)
@@ -211,9 +230,13 @@ class _MapBench:
         routed = {name: self._routed(name, trips) for name in self._files}
         both = [key for key in routed["ours"] if all(key in some for some in routed.values())]
         for name, vehicles in routed.items():
-            text = "".join(ET.tostring(vehicles[key], encoding="unicode") for key in both)
+            text = "".join(
+                ET.tostring(vehicles[key], encoding="unicode")
+                for key in both
+                if trips[int(key)][2] < END
+            )
             (self._folder / f"{name}.rou.xml").write_text(f"<routes>{VTYPE}{text}</routes>")
-        return {key: trips[int(key)][2] for key in both}
+        return {key: trips[int(key)][2] for key in both if trips[int(key)][2] < END}
 
     def _walks(self) -> None:
         """Write persons who walk from pavement to pavement, over all crossings."""
@@ -270,7 +293,7 @@ class _MapBench:
         files = ",".join(str(self._folder / file) for file in routes)
         for seed in seeds:
             _tool("sumo", "-n", self._files[name], "-r", files,
-                  "--end", "3600", "--step-length", "0.5", "--seed", str(seed),
+                  "--end", f"{END:g}", "--step-length", "0.5", "--seed", str(seed),
                   "--tripinfo-output", info, "--tripinfo-output.write-unfinished",
                   "--statistic-output", stats, "--no-warnings", "--no-step-log",
                   "--collision.check-junctions", "true", "--collision.action", "warn",
@@ -298,7 +321,7 @@ class _MapBench:
 
 def _delay(trip: ET.Element | None, depart: float) -> float:
     if trip is None:
-        return HOUR - depart
+        return END - depart
     return float(trip.get("timeLoss", 0)) + max(0.0, float(trip.get("departDelay", 0)))
 
 

@@ -37,7 +37,7 @@ test("before the first segment nothing is highlighted, though all may be chosen"
 });
 
 test("segments of measures are drawn whole, lanes as lanes, and incidents as signs", () => {
-  const closure = { id: "m", kind: "closure", begin: 0, end: null } as const;
+  const closure = { id: "m", kind: "closure", begin: 0, end: null, destinations: "leave" } as const;
   const drawn = (...places: string[]) => measureShapes(graph, [{ ...closure, places }], null);
   expect([...drawn("b").segments.keys()]).toEqual([1]);
   expect(drawn("b").rings).toEqual([]);

@@ -87,6 +87,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
   study: { warm_up: 0, interval: null, detectors: [], sections: [], cordons: [] },
   rules: [],
   criteria: [],
+  sumo: null,
   parameters: {},
   formulas: {},
 });

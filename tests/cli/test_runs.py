@@ -8,6 +8,7 @@ import polars as pl
 import pytest
 import sumo
 
+from odscen.runs.finished_run import Run
 from tests.cli.conftest import odscen
 
 GENERATE = ("generate", "--map", "signal_crossing", "--fill", "0.25", "--seed", "5", "--json")
@@ -34,6 +35,34 @@ def test_a_sampled_scenario_has_nothing_to_remark(workspace, scenario):
     done = odscen("check", scenario, "--json", "--workspace", workspace)
     assert done.code == 0
     assert done.json["problems"] == []
+
+
+@pytest.mark.slow
+def test_the_motion_of_a_run_is_checked_with_place_time_and_cause(workspace, finished):
+    run = Path(finished["files"]["summary"]).parent
+    done = odscen("check", "--run", run, "--json", "--workspace", workspace)
+    found = done.json
+    figures = json.loads((run / "summary.json").read_text())["figures"]
+    assert found["implausible"] == figures["implausible_motion"]
+    assert found["hard_braking"] == figures["hard_braking"]
+    assert done.code == (1 if found["implausible"] else 0), done.err
+    assert sum(row["findings"] for row in found["counts"]) == len(found["findings"])
+    assert sum(row["counted"] for row in found["findings"]) == found["implausible"]
+    trajectories = Run.open(run).trajectories()
+    for row in found["findings"][:20]:
+        there = trajectories.filter(
+            (pl.col("id") == row["id"]) & pl.col("time").is_between(row["begin"], row["end"])
+        )
+        places = zip(there["x"], there["y"], strict=True)
+        assert min(math.dist((row["x"], row["y"]), place) for place in places) < 0.01
+        assert row["value"] > row["bound"]
+    assert "Plausibility of motion" in (run / "report.html").read_text()
+    done = odscen("check", "--run", run, "--workspace", workspace)
+    assert f"{found['implausible']} findings of implausible motion" in done.err
+    done = odscen("check", "--workspace", workspace)
+    assert (done.code, "--run" in done.err) == (2, True)
+    done = odscen("check", "--run", "nowhere", "--workspace", workspace)
+    assert (done.code, "no run named 'nowhere'" in done.err) == (2, True)
 
 
 @pytest.mark.slow

@@ -385,6 +385,22 @@ def test_varied_towns_differ_and_each_is_the_same_every_time():
     assert most_lanes(wide) == 4
 
 
+@pytest.mark.slow
+def test_arterial_towns_have_wide_roads_lights_and_ramps_and_are_the_same_every_time():
+    pytest.importorskip("scenariogeneration", reason="needs the maintainers' tools")
+    from tools.make_maps.__main__ import map_text
+
+    with_ramps, again, other = (map_text(f"arterial_town_{seed}") for seed in ("00", "00", "02"))
+    assert with_ramps == again
+    assert with_ramps != other
+    assert most_lanes(with_ramps) >= 3
+    root = ET.fromstring(with_ramps)
+    assert {road.get("name") for road in root.iter("road")} >= {"On-ramp"}
+    assert root.find(".//signal[@name='Light']") is not None
+    limits = [float(speed.get("max")) for speed in root.iterfind("road/type/speed")]
+    assert max(limits) >= 60.0
+
+
 def most_lanes(text: str) -> int:
     """Lanes for cars each way of the widest road."""
     roads = ET.fromstring(text).iterfind("road[@junction='-1']")

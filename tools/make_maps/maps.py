@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+from tools.make_maps.arterial_town import COUNT as ARTERIAL_COUNT
+from tools.make_maps.arterial_town import arterial_crossing, arterial_town
 from tools.make_maps.crossings import left_hand_crossing, signal_crossing, t_junction_signs
 from tools.make_maps.joined_towns import joined_towns
 from tools.make_maps.motorway import motorway_weave
@@ -29,9 +31,11 @@ MAPS: dict[str, Callable[[str], Builder]] = {
 }
 ON_DEMAND: dict[str, Callable[[str], Builder]] = {
     "large_town": large_town,
+    "arterial_crossing": arterial_crossing,
     "towns_10": partial(joined_towns, count=10),
     "towns_100": partial(joined_towns, count=100),
     **{f"varied_town_{seed:02d}": varied_town for seed in range(COUNT)},
+    **{f"arterial_town_{seed:02d}": arterial_town for seed in range(ARTERIAL_COUNT)},
 }
 """Too large, or too many, to be kept in the repository."""
 LEFT_HAND = {"left_hand_crossing"}

@@ -1877,13 +1877,14 @@ export interface components {
          * @description What can happen to an actor.
          *
          *     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
-         *     ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
-         *     and end; their id stands for that of an actor.
+         *     ``stranded``: a measure had closed every route to its goal, and it was taken out.
+         *     ``route_changed``: it did not get to the lane that its route needed, and took another one.
+         *     Measures begin and end; their id stands for that of an actor.
          *     What a rule does is reported of its actor, at the instant, which may lie inside a step;
          *     ``rule_acted`` is what no motion follows from, such as lights.
          * @enum {string}
          */
-        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
+        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "route_changed" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
         /** @description An expectation, what came of it, and whether it was met. */
         ExpectationInfo: {
             expectation: string;
@@ -3266,7 +3267,13 @@ export interface components {
             /** @default 1 */
             processes?: number;
         };
-        /** @description Segments, lanes or turns that no vehicle enters; who is on them drives out. */
+        /**
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         *
+         *     ``destinations`` says what becomes of trips to what is closed: the vehicle is taken out at once
+         *     (``leave``), the trip ends on the last open road before it (``end``), or the vehicle waits
+         *     there beside the road until the closure ends (``wait``).
+         */
         "RoadClosure-Input": {
             id: string;
             /** @default 0 */
@@ -3278,8 +3285,19 @@ export interface components {
              */
             kind: "closure";
             places: string[];
+            /**
+             * @default leave
+             * @enum {string}
+             */
+            destinations?: "leave" | "end" | "wait";
         };
-        /** @description Segments, lanes or turns that no vehicle enters; who is on them drives out. */
+        /**
+         * @description Segments, lanes or turns that no vehicle enters; who is on them drives out.
+         *
+         *     ``destinations`` says what becomes of trips to what is closed: the vehicle is taken out at once
+         *     (``leave``), the trip ends on the last open road before it (``end``), or the vehicle waits
+         *     there beside the road until the closure ends (``wait``).
+         */
         "RoadClosure-Output": {
             id: string;
             /** @default 0 */
@@ -3291,6 +3309,11 @@ export interface components {
              */
             kind: "closure";
             places: string[];
+            /**
+             * @default leave
+             * @enum {string}
+             */
+            destinations: "leave" | "end" | "wait";
         };
         /**
          * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
@@ -3694,6 +3717,7 @@ export interface components {
             rules: components["schemas"]["StoryRule-Output"][];
             /** @default [] */
             criteria: string[];
+            sumo: components["schemas"]["SumoProject"] | null;
             parameters: {
                 [key: string]: components["schemas"]["Parameter"];
             };
@@ -4748,6 +4772,35 @@ export interface components {
          * @enum {string}
          */
         SummaryPart: "" | "actors" | "figures";
+        /**
+         * @description A file of SUMO: ``packed`` is its text, compressed (zlib) and in base64.
+         *
+         *     ``elements`` says how many of each kind it has, for people.
+         */
+        SumoFile: {
+            name: string;
+            /** @enum {string} */
+            kind: "routes" | "additional";
+            packed: string;
+            elements: {
+                [key: string]: number;
+            };
+        };
+        /**
+         * @description Files and options of a SUMO project.
+         *
+         *     ``begin`` is when its simulation begins, seconds; times of the run are those of SUMO, and
+         *     nothing happens before. ``options`` are SUMO's own, beside those that the simulation has.
+         */
+        SumoProject: {
+            /** @default 0 */
+            begin: number;
+            options: {
+                [key: string]: string;
+            };
+            /** @default [] */
+            files: components["schemas"]["SumoFile"][];
+        };
         /**
          * @description One case: values of the parameters and of the columns, in their order.
          *

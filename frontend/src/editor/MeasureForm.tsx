@@ -1,4 +1,4 @@
-import { Group, MultiSelect, SegmentedControl, TagsInput } from "@mantine/core";
+import { Group, MultiSelect, SegmentedControl, Select, TagsInput } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
 import { CATEGORIES, type Category, type Edit } from "../api/types";
@@ -112,7 +112,21 @@ const limit = (speed: number | null): number | "" => (speed === null ? "" : spee
 function KindFields({ measure, onChange }: { measure: Measure; onChange: Change }) {
   switch (measure.kind) {
     case "closure":
-      return null;
+      return (
+        <Select
+          label={t`Trips to what is closed`}
+          data={[
+            { value: "leave", label: t`are taken out at once` },
+            { value: "end", label: t`end on the last open road` },
+            { value: "wait", label: t`wait beside the road until it opens` },
+          ]}
+          allowDeselect={false}
+          value={measure.destinations}
+          onChange={(value) =>
+            onChange({ ...measure, destinations: value === "end" || value === "wait" ? value : "leave" })
+          }
+        />
+      );
     case "speed_limit":
       return (
         <Committed

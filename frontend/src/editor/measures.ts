@@ -105,7 +105,7 @@ export function newMeasure(
     case "permission":
       return { ...always, kind, places, allowed: ["bus", "bicycle"], banned: [] };
     case "closure":
-      return { ...always, kind, places };
+      return { ...always, kind, places, destinations: "leave" };
   }
 }
 

@@ -66,6 +66,8 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
       return t`${who} did not come back with the saved state`;
     case "stranded":
       return t`${who} was stranded: every route to its goal was closed`;
+    case "route_changed":
+      return t`${who} took another route: it did not get to the lane that it needed`;
     case "measure_begin":
       return t`Measure ${incident.actor} began`;
     case "measure_end":

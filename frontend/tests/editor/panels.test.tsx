@@ -405,7 +405,7 @@ test("a run is played by the simulator that is chosen, and what that leaves out 
 
 test("measures are listed with what they do and when", () => {
   const measures: ScenarioDocument["measures"] = [
-    { id: "shut", kind: "closure", begin: 60, end: 120, places: ["r1"] },
+    { id: "shut", kind: "closure", begin: 60, end: 120, places: ["r1"], destinations: "leave" },
     {
       id: "buses",
       kind: "permission",

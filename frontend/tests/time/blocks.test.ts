@@ -6,6 +6,7 @@ import { actor, flow, scenario } from "../example";
 
 const CLOSURE: ScenarioDocument["measures"][number] = {
   kind: "closure",
+  destinations: "leave",
   id: "shut",
   begin: 10,
   end: null,

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from odscen.base.errors import InputError
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
 from odscen.cli.scenario_commands import ScenarioArgument
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from odscen.app.demand.traffic_files import TrafficReport
+
+
+class CountUse(StrEnum):
+    """What counts are for."""
+
+    generate = "generate"
+    compare = "compare"
+
 
 app = typer.Typer(
     help="Traffic from tables of trips and counts, or made up, and how well it fits counts.",
@@ -43,6 +57,14 @@ TrialOption = Annotated[
 @app.command("import")
 def import_(
     scenario: ScenarioArgument,
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="Files of any kind: VISUM and SUMO matrices, edgeData, turns, detectors, taz, "
+            "tables with any titles (CSV, Excel).",
+            metavar="[FILE]...",
+        ),
+    ] = None,
     trips: Annotated[
         Path | None,
         typer.Option(
@@ -68,6 +90,34 @@ def import_(
     zones: Annotated[
         Path | None, typer.Option(help="Table of zones: zone,segment.", metavar="CSV")
     ] = None,
+    stations: Annotated[
+        Path | None,
+        typer.Option(
+            help="Where the stations of a FILE are: a table with station and lon,lat or x,y or "
+            "edge, or SUMO's definitions of detectors.",
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            help="Which column of a FILE has what; kept for tables with the same titles.",
+            metavar="station=Zst,time=Zeit,count=Kfz",
+        ),
+    ] = None,
+    interval: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="Minutes that a row of a FILE counts, where it does not say."),
+    ] = None,
+    date: Annotated[
+        str | None, typer.Option(help="The day that is taken of a FILE.", metavar="2026-03-02")
+    ] = None,
+    time_zone: Annotated[
+        str | None,
+        typer.Option(help="Of the stations, for stamps in UTC.", metavar="Europe/Berlin"),
+    ] = None,
+    use: Annotated[
+        CountUse, typer.Option(help="Make traffic that meets counts, or compare it with them.")
+    ] = CountUse.generate,
     name: NameOption = None,
     mix: MixOption = None,
     day: DayOption = None,
@@ -75,13 +125,14 @@ def import_(
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Read tables into a scenario: zones, day profiles, inputs, trips from where to where, counts.
+    """Read trips, counts, zones, inputs, day profiles or detectors into a scenario.
 
-    The scenario holds the values; the tables are not needed any more. What has the same name is
-    replaced.
+    Of a FILE it is found out what it is, and reported what was taken and what was not. The scenario
+    holds the values; the files are not needed any more. What has the same name is replaced.
     """
     from odscen.app import scenarios
-    from odscen.app.demand import demands
+    from odscen.app.demand import demands, traffic_files
+    from odscen.formats.office.traffic_file import ReadingOptions
     from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
@@ -95,14 +146,67 @@ def import_(
         "counts": counts,
     }
     given = {kind: file for kind, file in tables.items() if file is not None}
-    if not given:
-        raise InputError("name a table to import: --od, --inputs, --counts, --profile or --zones")
+    if not given and not files:
+        raise InputError(
+            "name a FILE to import, or a table: --od, --inputs, --counts, --profile or --zones"
+        )
     for kind, file in given.items():
         document = demands.import_demand(
             store, document, file, kind=kind, name=name, day=day, **common
         )
+    options = ReadingOptions(
+        columns=_parse_columns(columns),
+        interval=None if interval is None else interval * 60.0,
+        date=date,
+        time_zone=time_zone,
+    )
+    reports = []
+    for given_file in files or ():
+        document, report = traffic_files.import_traffic(
+            store, document, given_file, stations=stations, options=options, name=name,
+            use=use.value, profile=day, **common,
+        )  # fmt: skip
+        _print_traffic(given_file, report)
+        reports.append({"file": str(given_file), **report.to_dict()})
     path = scenarios.write_scenario(document, out or scenario)
-    _report_demand(document.demand.model_dump(mode="json"), path, as_json=as_json)
+    _report_demand(document.demand.model_dump(mode="json"), path, as_json=as_json, reports=reports)
+
+
+_SHOWN_ROWS = 12
+"""Rows of each list of the report that are printed; JSON has all."""
+
+
+def _parse_columns(text: str | None) -> dict[str, str]:
+    found = {}
+    for part in (text or "").split(","):
+        if not part.strip():
+            continue
+        role, equals, title = part.partition("=")
+        if not equals or not title.strip():
+            raise InputError(f"columns are written as station=TITLE,time=TITLE, not {text!r}")
+        found[role.strip()] = title.strip()
+    return found
+
+
+def _print_traffic(file: Path, report: TrafficReport) -> None:
+    log(f"{file}: {report.words}")
+    if report.columns:
+        log(
+            "columns: "
+            + ", ".join(f"{role} is {title!r}" for role, title in report.columns.items())
+        )
+    for title, rows in (
+        ("left out", [f"{where}: {reason}" for where, reason in report.left_out]),
+        ("not on the map", [f"{name}: {reason}" for name, reason in report.unplaced.items()]),
+        ("note", report.notes),
+        ("doubtful", report.doubts),
+    ):
+        for row in rows[:_SHOWN_ROWS]:
+            log(f"{title}: {row}")
+        if len(rows) > _SHOWN_ROWS:
+            log(f"{title}: and {len(rows) - _SHOWN_ROWS} more; --json lists all")
+    if report.next:
+        log(f"next: {report.next}")
 
 
 @app.command()
@@ -338,7 +442,13 @@ def _lane_ids(text: str) -> tuple[int, ...]:
         raise InputError(f"lanes are written as -1,-2, not {text!r}") from None
 
 
-def _report_demand(demand: dict[str, Any], path: Path, *, as_json: bool) -> None:
+def _report_demand(
+    demand: dict[str, Any],
+    path: Path,
+    *,
+    as_json: bool,
+    reports: Sequence[Mapping[str, Any]] = (),
+) -> None:
     sizes = {
         "zones": len(demand["zones"]),
         "profiles": len(demand["profiles"]),
@@ -350,4 +460,4 @@ def _report_demand(demand: dict[str, Any], path: Path, *, as_json: bool) -> None
     log(", ".join(f"{value:g} {name}" for name, value in sizes.items()))
     log(f"Wrote {path}")
     if as_json:
-        print_json({"file": str(path), **sizes})
+        print_json({"file": str(path), **sizes, **({"files": list(reports)} if reports else {})})

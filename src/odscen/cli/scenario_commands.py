@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from odscen.base.errors import InputError, in_file
+from odscen.base.shown import visible
 from odscen.cli.console import (
     JsonOption,
     WorkspaceOption,
@@ -16,6 +17,7 @@ from odscen.cli.console import (
     log,
     option_settings,
     print_json,
+    print_table,
     progress,
 )
 
@@ -139,19 +141,33 @@ def _fill_row(checked: CheckedFill) -> dict[str, Any]:
 
 def check(
     scenarios: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(help="Scenarios, as JSON, GraphML or arrays.", metavar="SCENARIO..."),
-    ],
+    ] = None,
+    run: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="RUN",
+            help="A finished run instead, its folder or its name: whether its road users moved "
+            "as bodies and drivers do.",
+        ),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Check scenarios: everything that is wrong with them, where and why.
+    """Check scenarios, or the motion of a run: everything that is wrong, where and why.
 
     Exit code 0 without errors (warnings are allowed), 2 with errors. Of several files, one that
-    cannot be read does not keep the others from being checked.
+    cannot be read does not keep the others from being checked. Of a run: 0 if its motion is
+    plausible, 1 if something is implausible; hard braking and what moves by force are only shown.
     """
     from odscen.maps.store import Workspace
 
+    if (run is None) == (not scenarios):
+        raise typer.BadParameter("give scenarios, or a run with --run", param_hint="SCENARIO...")
+    if run is not None:
+        raise typer.Exit(_check_run(Workspace.open(workspace), run, as_json=as_json))
+    assert scenarios
     store = Workspace.open(workspace)
     if len(scenarios) == 1:  # an error of reading it is the command's own
         files = [_check_file(store, scenarios[0])]
@@ -161,6 +177,39 @@ def check(
     if as_json:
         print_json(files[0] if len(files) == 1 else {"valid": valid, "files": files})
     raise typer.Exit(0 if valid else 2)
+
+
+def _check_run(store: Workspace, run: Path, *, as_json: bool) -> int:
+    """Check the motion of a run, print what was found, and return the exit code."""
+    from odscen.app.running.motion_checks import motion_report
+
+    report = motion_report(store, run)
+    if as_json:
+        print_json(report)
+    else:
+        keys = ("kind", "category", "cause", "findings", "users", "value", "unit", "bound")
+        rows = [tuple(_rounded(row[key]) for key in keys) for row in report["counts"]]
+        print_table("", keys, rows)
+        for row in report["findings"]:
+            if row["counted"]:
+                partner = f" and {row['partner']}" if row["partner"] else ""
+                log(
+                    visible(
+                        f"{row['begin']:.1f} s: {row['id']}{partner}, {row['category']}: "
+                        f"{row['kind']} {row['value']:.2f} {row['unit']} "
+                        f"(bound {row['bound']:.2f}) at x {row['x']:.1f} m, y {row['y']:.1f} m, "
+                        f"lane {row['lane'] or '-'}; {row['cause']}"
+                    )
+                )
+    log(
+        f"{report['run']}: {report['implausible']} findings of implausible motion, "
+        f"{report['hard_braking']} of hard braking, {report['forced']} moved by force"
+    )
+    return 1 if report["implausible"] else 0
+
+
+def _rounded(value: object) -> object:
+    return round(value, 2) if isinstance(value, float) else value
 
 
 def _checked_or_refused(workspace: Workspace, path: Path) -> dict[str, Any]:

@@ -291,6 +291,8 @@ class ImportSource:
         What was chosen, by name.
     map_given
         Whether a map, or a folder of maps, was given beside the file.
+    bring_network
+        Makes a map of a SUMO network, of a file's name and content, or gives the one that has it.
     """
 
     name: str
@@ -299,6 +301,7 @@ class ImportSource:
     assets: Assets
     options: Mapping[str, str] = field(default_factory=dict)
     map_given: bool = False
+    bring_network: Callable[[str, bytes], ImportMap] | None = None
 
     def map(self, named: str = "") -> ImportMap:
         """The map that was given beside the file, or else the one that it names.

@@ -138,7 +138,9 @@ def build_map(
         "files": FILES if imported is None else {**FILES, "original": imported.original},
         "semantics": map_semantics(odr, table),
         "report": report.to_dict(),
-        "fidelity": _measure_fidelity(verify(network.net_xml, odr, table)),
+        "fidelity": _measure_fidelity(
+            verify(network.net_xml, odr, table, offset=network.table.net_offset)
+        ),
         **({} if imported is None else {"import": imported.to_dict()}),
         "build_seconds": round(time.perf_counter() - start, 3),
     }

@@ -228,7 +228,8 @@ class MapEntry:
 
         odr = parse(self.read("xodr"), file=self.path("xodr").name)
         with in_file(self.path("net").name):
-            return verify(self.read("net"), odr, RoadTable.of(odr))
+            offset = self.lane_table().net_offset
+            return verify(self.read("net"), odr, RoadTable.of(odr), offset=offset)
 
     def statistics(self) -> MapStatistics:
         """Figures of the map."""

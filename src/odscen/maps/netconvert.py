@@ -39,6 +39,8 @@ _PATIENCE = 10.0
 _HEADER = re.compile(rb"<!-- generated on .*?-->\s*", re.DOTALL)
 """netconvert's comment with date and command line; the same input must give the same bytes."""
 
+_DATE = re.compile(rb'(?<=\\s)date="[^"]*"')
+
 _NOISE = ("SUMO_HOME is not set", "pj_obj_create", "proj_create", "Success.", "Quitting (on error)")
 _MESSAGES_KEPT = 200
 
@@ -97,17 +99,51 @@ def convert_map(xodr: bytes, *, lefthand: bool) -> tuple[bytes, tuple[ReportEntr
     raise failure
 
 
+def opendrive_of_network(net_xml: bytes) -> tuple[bytes, tuple[ReportEntry, ...]]:
+    """Make OpenDRIVE of a SUMO network, in the coordinates of the network.
+
+    Returns
+    -------
+    The ``.xodr``, and netconvert's warnings as entries of the import report.
+
+    Raises
+    ------
+    ToolError
+        If netconvert refuses the network; with its own words.
+    MissingDependencyError
+        If SUMO is not installed.
+    """
+    megabytes = len(net_xml) / 1e6
+    seconds = min(10.0 * MOST_SECONDS, LEAST_SECONDS + SECONDS_PER_MEGABYTE * megabytes)
+    limits = NetconvertLimits(seconds, MEMORY + int(MEMORY_PER_MEGABYTE * megabytes))
+    done = run_netconvert(
+        ["--sumo-net-file=given.net.xml"],
+        files={"given.net.xml": net_xml},
+        limits=limits,
+        output="--opendrive-output",
+    )
+    xodr = _DATE.sub(b'date=""', done.net_xml, count=1)
+    entries = (ReportEntry(ElementOutcome.GUESSED, "netconvert", line) for line in done.messages)
+    return xodr, tuple(entries)
+
+
 def run_netconvert(
-    options: Sequence[str], *, files: Mapping[str, bytes], limits: NetconvertLimits
+    options: Sequence[str],
+    *,
+    files: Mapping[str, bytes],
+    limits: NetconvertLimits,
+    output: str = "--output-file",
 ) -> NetconvertOutput:
     """Run netconvert in a folder of its own.
 
     Parameters
     ----------
     options
-        All but ``--output-file``; names of files in them are those of ``files``.
+        All but ``output``; names of files in them are those of ``files``.
     files
         What it reads; names without commas, at which netconvert divides.
+    output
+        Option of what is to be made.
 
     Raises
     ------
@@ -120,9 +156,9 @@ def run_netconvert(
     with scratch_folder() as folder:
         for file, content in files.items():
             (folder / file).write_bytes(content)
-        output = folder / "made.net.xml"
+        made = folder / "made.xml"
         with subprocess.Popen(
-            [program, *options, f"--output-file={output.name}"],
+            [program, *options, f"{output}={made.name}"],
             cwd=folder,
             env=environment,
             stdin=subprocess.DEVNULL,
@@ -132,10 +168,10 @@ def run_netconvert(
             _limit_child(process.pid, limits)
             said = _wait_for_output(process, limits.seconds)
         messages = _clean_messages(said)
-        if process.returncode != 0 or not output.is_file():
+        if process.returncode != 0 or not made.is_file():
             problem = _describe_problem(process.returncode, messages, limits)
             raise ToolError(problem, output="\n".join(messages))
-        return NetconvertOutput(_HEADER.sub(b"", output.read_bytes(), count=1), messages)
+        return NetconvertOutput(_HEADER.sub(b"", made.read_bytes(), count=1), messages)
 
 
 def _wait_for_output(process: subprocess.Popen[bytes], seconds: float) -> bytes:

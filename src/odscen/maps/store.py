@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from odscen.maps.importers.base import ImportSettings
     from odscen.simulators.assets import Assets
 
-BUILDER = "14"
+BUILDER = "15"
 """Raised whenever what a map folder contains changes; older folders are rebuilt when opened."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"
@@ -328,14 +328,29 @@ class Workspace:
         settings: ConversionSettings = USUAL,
         importing: ImportSettings = DETECTED,
         limits: BuildLimits = BY_SIZE,
+        network: GivenNetwork | None = None,
         progress: ProgressCallback | None = None,
     ) -> MapEntry:
-        """Build a map as :meth:`add_map` does, from the text of a file of that name."""
+        """Build a map as :meth:`add_map` does, from the text of a file of that name.
+
+        ``network`` is one that is to be its SUMO network, as of :meth:`set_network`.
+        """
         name, file = check_name(name), printable(file)
         final = self.root / "maps" / name
         with _workspace_errors(self.root), self._lock_map(name):
             built = _read_whole_map(final)
             same = built if built and built.source_sha256 == digest(content) else None
+            if network is not None:
+                return self._build_and_store(
+                    name,
+                    content,
+                    file,
+                    replace(settings, converter="file"),
+                    importing,
+                    network,
+                    limits,
+                    progress,
+                )
             if settings.converter is None:
                 settings = replace(settings, converter=same.converter if same else "odscen")
             if same:

@@ -28,8 +28,9 @@ class EventKind(StrEnum):
     """What can happen to an actor.
 
     A jam is reported of its first vehicle. ``lost``: it did not come back with a saved state.
-    ``stranded``: a measure had closed every route to its goal, and it was taken out. Measures begin
-    and end; their id stands for that of an actor.
+    ``stranded``: a measure had closed every route to its goal, and it was taken out.
+    ``route_changed``: it did not get to the lane that its route needed, and took another one.
+    Measures begin and end; their id stands for that of an actor.
     What a rule does is reported of its actor, at the instant, which may lie inside a step;
     ``rule_acted`` is what no motion follows from, such as lights.
     """
@@ -44,6 +45,7 @@ class EventKind(StrEnum):
     JAM_END = "jam_end"
     LOST = "lost"
     STRANDED = "stranded"
+    ROUTE_CHANGED = "route_changed"
     MEASURE_BEGIN = "measure_begin"
     MEASURE_END = "measure_end"
     RULE_STARTED = "rule_started"
@@ -71,10 +73,11 @@ class Event(NamedTuple):
         Arrivals: seconds since departure.
     detail
         SUMO's word for the kind of collision, or ``bodies`` where odscen has found it; why a
-        vehicle was gridlocked (teleports, jams); what a measure does; why a rule could not do what
-        it says.
+        vehicle was gridlocked (teleports, jams) or took another route; what a measure does; why a
+        rule could not do what it says.
     waited
-        Seconds that the first vehicle in a jam, or a teleported one, was stopped there.
+        Seconds that the first vehicle in a jam, or one that was teleported or took another route,
+        was stopped there.
     queue
         How many vehicles are stopped in a jam.
     rule

@@ -81,6 +81,9 @@ class PlannedActor:
         when it takes one.
     appears
         Whether a rule lets it appear; until then it is not due, and ``depart`` is the run's end.
+    from_file
+        Whether it comes from a file of a SUMO project: where on its first edge it departs is
+        SUMO's choice.
     """
 
     id: str
@@ -106,6 +109,7 @@ class PlannedActor:
     begins_in: str | None = None
     ends_in: str | None = None
     appears: bool = False
+    from_file: bool = False
 
     @property
     def person(self) -> bool:
@@ -146,12 +150,22 @@ def begin_area(area: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ClosedPeriod:
-    """From ``begin`` to ``end`` (s) vehicles of ``vclass`` cannot pass between these edges."""
+    """From ``begin`` to ``end`` (s) vehicles of ``vclass`` cannot pass between these edges.
+
+    Attributes
+    ----------
+    ends
+        Closed edges before which trips to them end.
+    waits
+        Closed edges before which those who are bound for them wait, and until when (s).
+    """
 
     begin: float
     end: float
     vclass: str
     pairs: tuple[tuple[str, str], ...]
+    ends: tuple[str, ...] = ()
+    waits: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +235,7 @@ class Plan:
         }
         if self.measures:
             head["measures"] = [asdict(measure) for measure in self.measures]
-            head["closed"] = [asdict(period) for period in self.closed]
+            head["closed"] = [without_defaults(period, _CLOSED_DEFAULTS) for period in self.closed]
         said: dict[str, Any] = {
             "warm_up": self.warm_up,
             "interval": self.interval,
@@ -251,7 +265,9 @@ class Plan:
             data["net_offset"] = (float(x), float(y))
             data["actors"] = tuple(map(_PLANNED_ACTOR, data["actors"]))
             data["measures"] = _make_nested(_PLANNED_MEASURE, data.get("measures", ()), "lines")
-            data["closed"] = _make_nested(_CLOSED_PERIOD, data.get("closed", ()), "pairs")
+            data["closed"] = _make_nested(
+                _CLOSED_PERIOD, data.get("closed", ()), "pairs", "ends", "waits"
+            )
             data["stations"] = tuple(map(PlannedStation.from_dict, data.get("stations", ())))
             data["parking"] = tuple(map(_PLANNED_PARKING, data.get("parking", ())))
             data["criteria"] = tuple(data.get("criteria", ()))
@@ -259,10 +275,18 @@ class Plan:
 
 
 def _make_nested(
-    make: Callable[[Mapping[str, Any]], _Row], rows: Iterable[Mapping[str, Any]], name: str
+    make: Callable[[Mapping[str, Any]], _Row], rows: Iterable[Mapping[str, Any]], *names: str
 ) -> tuple[_Row, ...]:
-    """Make rows of which one field has tuples of tuples."""
-    return tuple(make({**row, name: tuple(map(tuple, row[name]))}) for row in rows)
+    """Make rows of which some fields, if they are there, have tuples, or tuples of tuples."""
+    return tuple(
+        make({**row, **{name: _as_tuples(row[name]) for name in names if name in row}})
+        for row in rows
+    )
+
+
+def _as_tuples(value: Any) -> Any:
+    """Lists, and those in them, as tuples."""
+    return tuple(map(_as_tuples, value)) if isinstance(value, list) else value
 
 
 _PLANNED_ACTOR = typed_rows(PlannedActor)
@@ -272,6 +296,7 @@ _PLANNED_MEASURE = typed_rows(PlannedMeasure)
 _PLANNED_PARKING = typed_rows(PlannedParking)
 
 _CLOSED_PERIOD = typed_rows(ClosedPeriod)
+_CLOSED_DEFAULTS = field_defaults(ClosedPeriod)
 
 _PLAN = typed_rows(Plan)
 _DEFAULTS = field_defaults(PlannedActor)

@@ -19,6 +19,7 @@ from odscen.figures.measures.conflicts import SERIOUS_DRAC, SERIOUS_PET, SERIOUS
 from odscen.figures.measures.curves import presence
 from odscen.figures.measures.figure import ReportSection, RunData, SummaryPart
 from odscen.figures.measures.gridlock import find_incidents
+from odscen.figures.measures.motion import FORCED, KIND_UNITS, MotionKind, count_by_kind
 from odscen.figures.measures.registry import figure_values
 from odscen.figures.measures.timetable import LATE, stops_served
 from odscen.figures.measures.usability import UsabilityLevel, run_usability
@@ -95,6 +96,7 @@ def render_report(
     stations: pl.DataFrame | None = None,
     parking: ParkingUse | None = None,
     assignment: Assignment | None = None,
+    motion: pl.DataFrame | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -133,6 +135,8 @@ def render_report(
         Use of parking areas, if trips park.
     assignment
         How routes by travel time were found, if the scenario wants such.
+    motion
+        What the plausibility check of motion found, if trajectories were recorded.
 
     Returns
     -------
@@ -147,7 +151,9 @@ def render_report(
     incidents = find_incidents(plan, actors, events, end=end)
     cut_short = plan.until if summary.get("stopped") else None
     usability = run_usability(actors, incidents, end=end, until=cut_short)
-    run = RunData(actors, figures, conflicts=conflicts, visits=visits, end=end, parking=parking)
+    run = RunData(
+        actors, figures, conflicts=conflicts, visits=visits, end=end, parking=parking, motion=motion
+    )
     counts = figure_values(run, part=SummaryPart.ACTORS)
     given = summary.get("figures") or figure_values(run)
     values = {**given, **counts}
@@ -182,6 +188,7 @@ def render_report(
             progress=_progress_values(actors, end),
             conflicts=conflict_values(conflicts) if conflicts is not None else None,
             walking=_walking_values(given, actors, traces, end=end),
+            motion=motion_values(motion, values) if motion is not None else None,
             emissions=emission_values(figures) if figures else None,
             criteria=summary.get("criteria") or (),
             expectations=summary.get("expectations") or (),
@@ -322,6 +329,50 @@ def _speed_card(traces: pl.DataFrame) -> Card:
     speed = traces["speed"].filter(traces["category"] != "pedestrian").mean()
     text = f"{number(speed * 3.6, 1)} km/h" if isinstance(speed, int | float) else "-"
     return Card("mean speed on the road", text, "of all vehicles, stops included")
+
+
+MOST_MOTIONS = 20
+"""Findings of the check of motion that are listed."""
+
+
+def motion_values(found: pl.DataFrame, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Findings of the check of motion: by kind, category and cause, and the worst of each kind."""
+    counted = [
+        (
+            row["kind"],
+            row["category"],
+            row["cause"],
+            number(row["findings"], 0),
+            number(row["users"], 0),
+            f"{number(row['value'], 2)} {KIND_UNITS[MotionKind(row['kind'])]}",
+            number(row["bound"], 2),
+        )
+        for row in count_by_kind(found).iter_rows(named=True)
+    ]
+    own = found.filter(~found["cause"].is_in([str(cause) for cause in FORCED]))
+    worst = (
+        own.sort("value", descending=True, maintain_order=True)
+        .group_by("kind", maintain_order=True)
+        .head(MOST_MOTIONS // 5)
+        .head(MOST_MOTIONS)
+    )
+    listed = [
+        (
+            row["kind"],
+            row["id"] if row["partner"] is None else f"{row['id']}, {row['partner']}",
+            number(row["begin"], 1),
+            f"x {number(row['x'], 0)} m, y {number(row['y'], 0)} m",
+            row["lane"] or "-",
+            f"{number(row['value'], 2)} {KIND_UNITS[MotionKind(row['kind'])]}",
+            row["cause"],
+        )
+        for row in worst.iter_rows(named=True)
+    ]
+    return {
+        "cards": figure_cards(ReportSection.MOTION, values),
+        "counted": counted,
+        "listed": listed,
+    }
 
 
 MEASURE_LABELS = {
@@ -549,6 +600,10 @@ EVENT_WORDS = {
     EventKind.STRANDED: (
         "was stranded",
         "A measure had closed every route to its goal; it was taken out.",
+    ),
+    EventKind.ROUTE_CHANGED: (
+        "took another route",
+        "It did not get to the lane that its route needed.",
     ),
     EventKind.MEASURE_BEGIN: ("began", ""),
     EventKind.MEASURE_END: ("ended", ""),

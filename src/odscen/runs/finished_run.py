@@ -10,6 +10,7 @@ from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.given_files import as_path
 from odscen.figures.by_place.lane_places import LanePlaces
 from odscen.figures.measures.figure import Basis, SummaryPart
+from odscen.figures.measures.motion import read_motion
 from odscen.figures.measures.registry import names_of, run_figure
 from odscen.figures.measures.summary import ActorOutcome, actors_from_json
 from odscen.figures.measures.traffic_files import places_from_json, read_stations, read_tables
@@ -20,6 +21,7 @@ from odscen.records.run_plan import Plan
 from odscen.runs import layout
 from odscen.runs.deferred_figures import checked_summary, figure_of_actors, measured_summary
 from odscen.runs.ended import RECORDS_ONLY
+from odscen.runs.measured import measure_motion
 from odscen.runs.recorded import read_trajectories
 
 if TYPE_CHECKING:
@@ -257,6 +259,32 @@ class Run:
             )
         plan = Plan.from_json(self._read_text(layout.PLAN_FILE))
         return body_centres(recorded.rows, plan).drop("row")
+
+    def motion(self) -> pl.DataFrame:
+        """Find motion that no body or driver makes, and hard braking.
+
+        Returns
+        -------
+        polars.DataFrame
+            One row per finding, in order of time: ``kind`` (jump, lateral speed, ...),
+            ``category``, ``id``, ``begin``, ``end`` (s), ``x``, ``y`` (m, body centre at its worst,
+            OpenDRIVE frame), ``lane`` (of SUMO), ``value`` (worst) and ``bound`` in the unit of the
+            kind, ``cause`` (rule, teleport and collision move by force), ``partner`` (of overlaps).
+
+        Raises
+        ------
+        InputError
+            If trajectories were not recorded, or more than 1 s apart.
+        """
+        found = read_motion(self.folder / layout.FIGURES_FOLDER)
+        if found is None and not self.known.get("meso"):
+            found = measure_motion(self.folder)
+        if found is None:
+            raise InputError(
+                "motion cannot be checked: no trajectories were recorded, or more than 1 s apart",
+                file=str(self.folder),
+            )
+        return found
 
     def lane_places(self) -> LanePlaces:
         """Segment, junction and movement of each SUMO lane: tables to join trajectories with.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from odscen.base.stored_files import stored_document
 from odscen.figures.by_place.analysis_times import WHOLE_RUN, AnalysisTimes, on_clock
 from odscen.figures.by_place.control_delay import vehicle_passages
@@ -27,10 +29,13 @@ from odscen.figures.by_place.station_figures import station_figures
 from odscen.figures.by_place.traffic import traffic_figures
 from odscen.figures.by_place.traffic_sums import summable
 from odscen.figures.measures.figure import RunData
+from odscen.figures.measures.motion import RoadLanes, check_motion, write_motion
 from odscen.figures.measures.signal_use import signal_use, write_signal_use
 from odscen.figures.measures.traffic_files import figures_json, write_stations, write_tables
 from odscen.records.light_programs import programs_from_json
+from odscen.records.replay import body_centres
 from odscen.records.row_text import VERSION
+from odscen.records.run_events import events_from_json
 from odscen.records.run_plan import PLAN_FORMAT, Plan, PlannedStation
 from odscen.runs import layout
 from odscen.runs.net_facts import read_net_facts
@@ -40,6 +45,7 @@ from odscen.runs.recorded import (
     read_lanes,
     read_light_states,
     read_stays,
+    read_trajectories,
     read_trips,
     read_visits,
     scan_trajectories,
@@ -281,6 +287,50 @@ def read_run_data(
         visits=read_visits(run),
         stations=None if meso else _measure_stations(records, end=end, times=times),
         parking=read_parking(run, begin=first, end=end),
+        motion=None if meso else _rows_since(_measure_motion(records), "begin", first),
+    )
+
+
+def measure_motion(run: Path) -> pl.DataFrame | None:
+    """Check the motion of all road users of a run, see :func:`check_motion`.
+
+    Returns
+    -------
+    ``None`` if trajectories were not recorded, or too seldom.
+
+    Raises
+    ------
+    InputError
+        If the records cannot be read.
+    """
+    return _measure_motion(_Records(run, meso=False))
+
+
+def _measure_motion(records: _Records) -> pl.DataFrame | None:
+    run = records.run
+    recorded = read_trajectories(run)
+    if recorded is None or not (run / layout.PLAN_FILE).is_file():
+        return None
+    plan = Plan.from_json((run / layout.PLAN_FILE).read_text(encoding="utf-8", errors="replace"))
+    events = (run / layout.EVENTS_FILE).read_text(encoding="utf-8", errors="replace")
+    return check_motion(
+        body_centres(recorded.rows, plan),
+        plan,
+        events_from_json(events),
+        _road_lanes(records.facts, plan),
+    )
+
+
+def _road_lanes(facts: NetFacts | None, plan: Plan) -> RoadLanes | None:
+    if facts is None:
+        return None
+    used = [lane for lane in facts.widths if len(facts.shapes.get(lane, ())) > 1]
+    return RoadLanes(
+        edges=dict(zip(facts.limits["lane"], facts.limits["edge"], strict=True)),
+        inside=facts.inside,
+        names=used,
+        lines=[facts.shapes[lane] - np.array(plan.net_offset) for lane in used],
+        widths=[facts.widths[lane] for lane in used],
     )
 
 
@@ -330,6 +380,8 @@ def write_figures(run: Path, data: RunData) -> None:
     """Write ``figures.json`` and the tables of a run; neither if nothing was measured on lanes."""
     if data.signals is not None:
         write_signal_use(data.signals, run / layout.FIGURES_FOLDER)
+    if data.motion is not None:
+        write_motion(data.motion, run / layout.FIGURES_FOLDER)
     if data.stations is not None:
         write_stations(data.stations, run / layout.FIGURES_FOLDER)
     if data.traffic is None:

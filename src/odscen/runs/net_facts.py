@@ -28,6 +28,9 @@ HEAVY = ("truck", "trailer", "bus", "coach", "fire", "tram")
 """SUMO's vehicle classes that count as heavy vehicles."""
 
 
+_LANE_WIDTH = "3.2"
+"""Metres, SUMO's default."""
+
 _DESIRED = {"bicycle": 20.0 / 3.6}
 """m/s, ``desiredMaxSpeed`` of vehicle classes for which SUMO has one; times the speed factor."""
 
@@ -118,6 +121,15 @@ def _net_facts(net: _NetFile) -> NetFacts:
         ),
         follows=_read_lane_successors(known),
         shapes={lane.get("id", ""): _parse_points(lane.get("shape", "")) for _, lane in lanes},
+        widths={
+            lane.get("id", ""): float(lane.get("width", _LANE_WIDTH))
+            for edge, lane in lanes
+            if edge.get("function") not in ("crossing", "walkingarea")
+            and lane.get("allow") != "pedestrian"
+        },
+        inside=frozenset(
+            lane.get("id", "") for edge, lane in lanes if edge.get("function") == "internal"
+        ),
         links=pl.DataFrame(
             list(links.values()),
             schema={

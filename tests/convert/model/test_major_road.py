@@ -54,7 +54,27 @@ def test_a_road_stands_out_that_is_faster_than_all_others() -> None:
     fast = approach("w", 0, speed=13.9), approach("e", 180, speed=13.9)
     assert stands_out([*fast, approach("n", -90, speed=8.3)], [True] * 3)
     assert not stands_out([*fast, approach("n", -90, speed=13.9)], [True] * 3)
-    assert not stands_out([*fast, approach("n", -90, speed=16.7)], [True] * 3)
+    assert not stands_out([*fast, approach("n", -90, speed=14.2)], [True] * 3)
+
+
+def test_above_50_kmh_there_is_no_right_before_left() -> None:
+    side = approach("n", -90, speed=16.7)
+    assert stands_out([approach("w", 0), approach("e", 180), side], [True] * 3)
+
+
+def test_a_carriageway_of_its_own_goes_before_the_road_that_meets_it() -> None:
+    """105 km/h and three lanes from the west, a minor street in both directions across it."""
+    main = [approach("w", 0, lane=lane, speed=29.2) for lane in range(3)]
+    assert major(*main, approach("n", -90), approach("s", 90)) == {"w"}
+    assert major(*main, approach("n", 60, speed=25.0)) == {"w"}
+
+
+def test_of_two_that_are_alike_in_all_one_goes_first_where_the_junction_is_large() -> None:
+    pair = [
+        approach(edge, angle, lane=lane) for edge, angle in (("w", 0), ("s", 90)) for lane in (0, 1)
+    ]
+    assert major(*pair) == frozenset()
+    assert len(major_edges(pair, [True] * 4, decide=True)) == 1
 
 
 def test_with_the_lights_off_a_crossing_has_a_major_road() -> None:

@@ -159,6 +159,23 @@ def test_a_motorway_makes_room_for_an_equally_fast_ramp_as_it_has_lanes_beside()
     assert sight_before(road, rights[0], listed, room=True) == 100.0
 
 
+def test_a_ramp_gives_way_to_an_equally_fast_road_with_traffic_in_both_directions() -> None:
+    road = movement(EAST, EAST)
+    beside = replace(
+        road,
+        source=(road.source[0], road.source[1] + 1),
+        target=(road.target[0], road.target[1] + 1),
+        shape=road.shape + np.array([0.0, 3.5, 0.0]),
+    )
+    against = movement(EAST + math.pi, EAST + math.pi)
+    against = replace(against, shape=against.shape + np.array([0.0, 12.0, 0.0]))
+    listed = [road, beside, movement(0.4, EAST), against]
+    found = find_conflicts(listed, [])
+    assert making_room(listed, found, Rules()) == {(2, 0)}
+    rights = requests(listed, found, Rules())
+    assert [right.yields_to for right in rights[:3]] == [frozenset(), frozenset(), {0}]
+
+
 def test_without_a_sign_one_sees_others_from_where_one_can_stop_for_them_in_comfort() -> None:
     """AASHTO's legs of sight triangles; a car stops with 4.5 m/s2, SUMO's least anticipation."""
     assert [sight_without_sign(kmh / 3.6) for kmh in (10.0, 30.0, 50.0, 75.0)] == [20, 25, 45, 70]

@@ -52,6 +52,7 @@ def test_a_normal_car_in_good_weather_has_the_documented_parameters() -> None:
         "vClass": "passenger", "guiShape": "passenger", "length": "5", "width": "1.8",
         "height": "1.5", "maxSpeed": "55.56", "speedDev": "0", "accel": "2.6", "decel": "4.5",
         "emergencyDecel": "9", "tau": "1.1", "sigma": "0", "minGap": "2", "impatience": "0.3",
+        "lcMaxSpeedLatStanding": "0", "lcMaxSpeedLatFactor": "0.3",
         "emissionClass": "HBEFA4/PC_petrol_Euro-4",
     }  # fmt: skip
 

@@ -150,6 +150,41 @@ def test_who_is_bound_for_a_closed_road_is_stranded_and_counted(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("destinations", ["end", "wait"])
+def test_trips_to_a_closed_road_end_or_wait_before_it_if_the_measure_says_so(
+    workspace: Workspace, town: LoadedMap, tmp_path: Path, destinations: str
+) -> None:
+    cars = [
+        {"id": "early", "category": "car", "spawn": "13.0.-1.20", "goal": "25.0.-1.30"},
+        {"id": "late", "category": "car", "spawn": "15.0.-1.10", "goal": "25.0.-1.30"},
+    ]
+    cars[1]["depart"] = 30.0  # type: ignore[assignment]
+    closed = {
+        "id": "shut",
+        "kind": "closure",
+        "begin": 10.0,
+        "end": 200.0,
+        "places": ["r25"],
+        "destinations": destinations,
+    }
+    run = Ended(
+        workspace,
+        scenario(town, actors=cars, measures=[closed], simulation={"duration": 400.0}),
+        tmp_path,
+    )
+    assert run.kinds(EventKind.STRANDED, EventKind.TELEPORT_START) == []
+    assert {one.status.value for one in run.outcomes.values()} == {"arrived"}
+    arrivals = [time for time, _, _ in run.kinds(EventKind.ARRIVED)]
+    if destinations == "end":
+        assert max(arrivals) < 200.0
+        assert run.on(town, "r25", 0.0, 400.0) == set()
+    else:
+        assert 200.0 < min(arrivals) < max(arrivals) < 300.0
+        assert run.on(town, "r25", 200.0, 400.0) == {"early", "late"}
+        assert run.on(town, "r25", 10.0, 200.0) == set()
+
+
+@pytest.mark.slow
 def test_a_closed_turn_is_driven_around_and_only_by_those_that_it_is_closed_to(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:

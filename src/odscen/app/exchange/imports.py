@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import check_scenario, write_scenario
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.checksums import digest
 from odscen.base.errors import InputError, NotFoundError
 from odscen.base.given_files import MOST, as_path, read_given
+from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.formats import find_format, format_of_file
 from odscen.formats.base import ImportMap, ImportSource
+from odscen.maps.converters import GivenNetwork
 from odscen.maps.folder_names import name_from_file
+from odscen.maps.netconvert import opendrive_of_network
 from odscen.opendrive.parse import parse
 
 if TYPE_CHECKING:
@@ -136,6 +143,7 @@ def import_file(
         find_entry=find_map,
         options=options,
         map_given=on_map is not None or maps is not None,
+        bring=partial(map_of_network, workspace, on_map=entry),
     )
     plan_file = None
     if out is not None and content.tracks is not None:
@@ -162,6 +170,7 @@ def read_content(
     find_entry: Callable[[str, GivenFile], MapEntry],
     options: Mapping[str, str] | None = None,
     map_given: bool = False,
+    bring: Callable[[str, bytes], MapEntry] | None = None,
 ) -> FileContent:
     """Read a file, from wherever it and what it names lie.
 
@@ -173,6 +182,8 @@ def read_content(
         Of the scenario.
     find_entry
         Gives the map that a file names.
+    bring
+        Makes a map of a SUMO network; in the workspace under the name of its file if not given.
 
     Raises
     ------
@@ -185,6 +196,11 @@ def read_content(
     if chosen.read is None:
         raise InputError(f"the format {of} is only written", file=file.where)
     chosen.refuse_unknown_options(options or {})
+
+    def bring_network(named: str, content: bytes) -> ImportMap:
+        entry = (bring or partial(map_of_network, workspace))(named, content)
+        sumo_map = load_map(entry).sumo
+        return ImportMap(entry.name, entry.sha256, sumo_map, lambda: parse(entry.read("xodr")))
 
     def find_map(named: str, asking: GivenFile) -> ImportMap:
         entry = find_entry(named, asking)
@@ -199,7 +215,57 @@ def read_content(
             assets=workspace.assets(),
             options=dict(options or {}),
             map_given=map_given,
+            bring_network=bring_network,
         )
+    )
+
+
+def map_of_network(
+    workspace: Workspace, named: str, content: bytes, *, on_map: MapEntry | None = None
+) -> MapEntry:
+    """The map that has a SUMO network, made of it if there is none.
+
+    OpenDRIVE is made of it by netconvert, for what is drawn and placed; the network itself stays
+    what it is, with its ids.
+
+    Parameters
+    ----------
+    named
+        File of the network.
+    content
+        The ``.net.xml``.
+    on_map
+        The map whose network it is to be.
+
+    Raises
+    ------
+    InputError
+        If it is no network, or none of that map.
+    ToolError
+        If netconvert refuses it.
+    """
+    sha256 = digest(content)
+
+    def has_it(entry: MapEntry) -> bool:
+        return str(entry.info["network"]["sha256"]) == sha256
+
+    if on_map is not None:
+        if has_it(on_map):
+            return on_map
+        with scratch_folder() as folder:
+            file = folder / "given.net.xml"
+            file.write_bytes(content)
+            return workspace.set_network(on_map.name, file)
+    known = workspace.first_map(has_it)
+    if known is not None:
+        return known
+    bare = re.sub(r"(\.net)?(\.xml)?(\.gz)?$", "", named.rpartition("/")[2], flags=re.IGNORECASE)
+    bare = re.sub(r"[^A-Za-z0-9_.-]+", "-", bare).strip("-._")[:60] or "network"
+    taken = set(workspace.map_names())
+    name = next(free for n in count(1) if (free := bare if n == 1 else f"{bare}-{n}") not in taken)
+    xodr, _ = opendrive_of_network(content)
+    return workspace.add_map_content(
+        xodr, file=f"{name}.xodr", name=name, network=GivenNetwork(content, printable(named))
     )
 
 

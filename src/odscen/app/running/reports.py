@@ -16,6 +16,7 @@ from odscen.base.text_files import write_text
 from odscen.figures.by_place.analysis_times import AnalysisTimes
 from odscen.figures.by_place.corridors import busiest_corridor, corridor_along, path_between
 from odscen.figures.by_place.traffic import TABLES, over_run
+from odscen.figures.measures.motion import read_motion
 from odscen.figures.measures.registry import figure_values
 from odscen.figures.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.figures.measures.summary import actors_from_json
@@ -98,9 +99,10 @@ def write_report(
     """
     with in_file(str(folder)), tables(str(folder)):
         figures = read_tables(folder / layout.FIGURES_FOLDER) if data is None else data.traffic
+        motion = read_motion(folder / layout.FIGURES_FOLDER) if data is None else data.motion
         own = folder / layout.FIGURES_FOLDER
         stations = read_stations(own) if data is None else data.stations
-        page = _render_page(folder, summary, loaded, corridor, figures, stations)
+        page = _render_page(folder, summary, loaded, corridor, figures, stations, motion)
     return write_text(out or folder / layout.REPORT_FILE, page)
 
 
@@ -111,6 +113,7 @@ def _render_page(
     corridor: Corridor | None,
     figures: TrafficFigures | None,
     stations: pl.DataFrame | None,
+    motion: pl.DataFrame | None,
 ) -> str:
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8", errors="replace")
@@ -139,6 +142,7 @@ def _render_page(
         stations=stations,
         parking=_read_parking_use(folder, summary),
         assignment=_read_assignment(folder),
+        motion=motion,
     )
 
 
@@ -205,7 +209,7 @@ def renew_report(
     DamagedError
         If a file of the run is not as it was written; that of the report is reported only.
     """
-    folder = _folder_of(workspace, run)
+    folder = folder_of(workspace, run)
     file = None if out is None else as_path(out)
     _read_completed_summary(
         folder
@@ -226,7 +230,14 @@ def renew_report(
     return report
 
 
-def _folder_of(workspace: Workspace, run: Run | GivenPath) -> Path:
+def folder_of(workspace: Workspace, run: Run | GivenPath) -> Path:
+    """Folder of a run that is given by itself, its folder, or its name.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none.
+    """
     if isinstance(run, Run):
         return run.folder
     own = as_path(run)
@@ -274,7 +285,7 @@ def interval_rows(
     InputError
         If it has not completed, or times do not fit what was measured.
     """
-    folder = _folder_of(workspace, run)
+    folder = folder_of(workspace, run)
     summary, data = _analyse_run(
         folder, _read_completed_summary(folder), warm_up=warm_up, interval=interval
     )

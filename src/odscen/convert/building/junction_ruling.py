@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
@@ -87,6 +88,12 @@ LARGE_LANES = 2
 FASTER = 2.0
 """m/s by which a road must be faster than others to go first in a small junction."""
 
+FAST = 50.0 / 3.6 + 0.5
+"""m/s above which no approach goes right before left; with two lanes for cars none does either."""
+
+_STRAIGHT_ON = math.radians(45.0)
+"""A road whose traffic turns by less leads on beyond the junction."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Approach:
@@ -94,25 +101,46 @@ class _Approach:
     heading: float
     speed: float
     lanes: int
+    bend: float
+    """Radians by which its straightest movement turns."""
 
 
-def major_edges(movements: Sequence[Movement], cars: Sequence[bool]) -> frozenset[str]:
-    """Edges by which the major road comes to a junction; none where no two are opposite.
+def major_edges(
+    movements: Sequence[Movement], cars: Sequence[bool], *, decide: bool = False
+) -> frozenset[str]:
+    """Edges by which the major road comes to a junction; none where no road is more than others.
+
+    A road has two opposite approaches, or one that leads on, as a carriageway of its own does.
 
     Parameters
     ----------
     cars
         Whether each movement is open to cars.
+    decide
+        Whether one of roads that are alike in all is taken.
     """
     approaches = _group_approaches(movements, cars)
+    if all(_same_road(one, other) for one, other in combinations(approaches, 2)):
+        return frozenset()
     pairs = [
         (one, other)
         for one, other in combinations(approaches, 2)
         if abs(wrapped(other.heading - one.heading)) > OPPOSING
     ]
-    if not pairs or all(_same_road(one, other) for one, other in combinations(approaches, 2)):
+    paired = {approach.edge for pair in pairs for approach in pair}
+    alone = [approach for approach in approaches if approach.edge not in paired]
+    roads = pairs + [
+        (approach, approach)
+        for approach in alone
+        if approach.bend < _STRAIGHT_ON or (decide and not pairs)
+    ]
+    if not roads:
         return frozenset()
-    best = max(pairs, key=_rank_of_pair)
+    best = max(roads, key=_rank_of_pair)
+    if not pairs and not decide:
+        ranks = [_rank_of_pair(road)[:2] for road in roads]
+        if len(roads) < len(approaches) or ranks.count(max(ranks)) > 1:
+            return frozenset()
     return frozenset(
         {
             approach.edge
@@ -132,8 +160,8 @@ def major_edges(movements: Sequence[Movement], cars: Sequence[bool]) -> frozense
 def stands_out(movements: Sequence[Movement], cars: Sequence[bool]) -> bool:
     """Whether a road goes first though no sign says so.
 
-    It does in junctions so large that equal right for all would lock them, and where one road is
-    faster than the others.
+    It does in junctions so large that equal right for all would lock them, or so fast that no
+    driver expects others from the right, and where one road is faster than the others.
     """
     approaches = _group_approaches(movements, cars)
     major = major_edges(movements, cars)
@@ -141,28 +169,31 @@ def stands_out(movements: Sequence[Movement], cars: Sequence[bool]) -> bool:
         (approach.speed for approach in approaches if approach.edge in major), default=0.0
     )
     others = [approach.speed for approach in approaches if approach.edge not in major]
-    return any(approach.lanes >= LARGE_LANES for approach in approaches) or (
-        bool(others) and slowest - max(others) > FASTER
-    )
+    return any(
+        approach.lanes >= LARGE_LANES or approach.speed > FAST for approach in approaches
+    ) or (bool(others) and slowest - max(others) > FASTER)
 
 
 def _group_approaches(movements: Sequence[Movement], cars: Sequence[bool]) -> list[_Approach]:
     lanes: dict[str, set[int]] = {}
+    bends: dict[str, float] = {}
     first: dict[str, Movement] = {}
     for movement, car in zip(movements, cars, strict=True):
         if car:
             edge, index = movement.source
             first.setdefault(edge, movement)
             lanes.setdefault(edge, set()).add(index)
+            bends[edge] = min(abs(movement.turn), bends.get(edge, math.inf))
     return [
-        _Approach(edge, movement.heading_in, movement.speed, len(lanes[edge]))
+        _Approach(edge, movement.heading_in, movement.speed, len(lanes[edge]), bends[edge])
         for edge, movement in first.items()
     ]
 
 
 def _rank_of_pair(pair: tuple[_Approach, _Approach]) -> tuple[float, int, float]:
     one, other = pair
-    straightness = round(abs(wrapped(other.heading - one.heading)), 2)
+    turned = abs(wrapped(other.heading - one.heading)) if one != other else math.pi - one.bend
+    straightness = round(turned, 2)
     return one.speed + other.speed, one.lanes + other.lanes, straightness
 
 
@@ -213,13 +244,14 @@ def ruled(
     all_stop = len(signs) > 1 and not signalled and set(signs.values()) == {Sign.STOP}
     unruled = len(set(signs.values())) <= 1 and not high_low
     major: frozenset[str] = frozenset()
+    large = stands_out(movements, cars)
     # Signs to give way on all approaches distinguish none, but say that there is a major road.
-    if signalled or (unruled and (any(signs.values()) or stands_out(movements, cars))):
-        major = major_edges(movements, cars)
+    if signalled or (unruled and (any(signs.values()) or large)):
+        major = major_edges(movements, cars, decide=large and not signalled)
     rules = Rules(high_low, lefthand, all_stop, signalled, major)
     zipped = frozenset(n for pair in in_turn(movements, conflicts, rules) for n in pair)
     yielding = frozenset(waits for waits, _ in making_room(movements, conflicts, rules))
-    equal = unruled and not major and not all_stop and not zipped and not yielding
+    equal = unruled and not large and not (major or all_stop or zipped or yielding)
     rights = requests(movements, conflicts, rules)
     return Ruling(movements, conflicts, rules, rights, zipped, yielding, equal)
 

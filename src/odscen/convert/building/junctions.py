@@ -241,7 +241,8 @@ def inner_junctions(
 class Passage:
     """A movement with all that its internal lane needs.
 
-    ``lights`` are the OpenDRIVE signals that control it.
+    ``lights`` are the OpenDRIVE signals that control it; ``heavy_speed`` is that of trucks and
+    buses in its curve, m/s.
     """
 
     movement: Movement
@@ -251,6 +252,7 @@ class Passage:
     type: str
     xodr: tuple[str, ...]
     lights: tuple[str, ...] = ()
+    heavy_speed: float = math.inf
 
 
 class Surroundings(NamedTuple):
@@ -469,6 +471,7 @@ def _inner_lane(edge: SumoEdgeId, passage: Passage) -> NetLane:
         passage.movement.shape,
         passage.type,
         xodr=passage.xodr,
+        heavy_speed=passage.heavy_speed,
     )
 
 

@@ -33,6 +33,7 @@ from odscen.convert.model.access import speed as lane_speed
 from odscen.convert.model.access import vehicle_classes
 from odscen.convert.model.connections import LostConnection, find_connections
 from odscen.convert.model.conversion_report import ConversionReport, parser_entries
+from odscen.convert.model.curve_speed import BINDING, HEAVY, comfortable_speed, sharpest_bend
 from odscen.convert.model.edge_plan import merge_gaps, plan_edges, side_gaps
 from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
@@ -221,16 +222,6 @@ def _turned_angle(line: Line) -> float:
     steps = line.shape[1:, :2] - line.shape[:-1, :2]
     headings = [math.atan2(y, x) for x, y in steps.tolist()]
     return sum(wrapped(b - a) for a, b in pairwise(headings))
-
-
-SIDEWAYS = 5.5
-"""m/s2 of lateral acceleration that the speed of a turn is limited to; netconvert's default."""
-
-EASED = math.radians(15.0)
-"""Change of heading that a turn gains by drivers who cut its corner; netconvert's default."""
-
-LEAST_TURN_SPEED = 2.0
-"""m/s."""
 
 
 def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> SumoNetwork:
@@ -491,27 +482,34 @@ class _NetworkBuilder:
             width=min(source.width, target.width),
             heading_in=before.headings()[1],
             heading_out=after.headings()[0],
-            speed=source.speed,
+            speed=self._edges[connection.source].lanes[connection.source_lane].limit,
             sign=self.control.signs[number],
             in_roundabout=connection.source in self._on_roundabouts,
             roads=frozenset(str(road) for road in (incoming, *connecting)),
         )
+        limits = [
+            self._edges[connection.source].lanes[connection.source_lane].limit,
+            self._edges[connection.target].lanes[connection.target_lane].limit,
+        ]
+        speed, heavy = self._internal_speeds(connection, line, around=min(limits))
         return Passage(
             movement,
             line.length,
-            self._internal_speed(
-                connection, line, movement.turn, around=min(source.speed, target.speed)
-            ),
+            speed,
             shared_classes(self._odr, self._table, self._edges, connection),
             source.type,
             self._origin_lanes(connection.alignment),
             self.control.lights[number],
+            heavy,
         )
 
-    def _internal_speed(
-        self, connection: PlannedConnection, line: Line, turn: float, *, around: float
-    ) -> float:
-        """Speed of an internal lane: what the map says, or else the slower road; less in curves."""
+    def _internal_speeds(
+        self, connection: PlannedConnection, line: Line, *, around: float
+    ) -> tuple[float, float]:
+        """Speed of an internal lane: what the map says, or else the slower road; less in curves.
+
+        The other is that of trucks and buses; infinite without a curve.
+        """
         table = self._table
         rows = np.array([stretch.row for stretch in connection.alignment])
         middle = np.array([(stretch.start + stretch.end) / 2.0 for stretch in connection.alignment])
@@ -522,21 +520,11 @@ class _NetworkBuilder:
             if not math.isnan(limit)
         ]
         speed = min(own) if own else around
-        sharp = abs(turn) - EASED
-        if sharp > 0.0:
-            radius = self._turning_length(connection, line) / sharp + line.widths[1] / 4.0
-            speed = min(speed, math.sqrt(SIDEWAYS * radius))
-        return round(max(speed, LEAST_TURN_SPEED), 2)
-
-    def _turning_length(self, connection: PlannedConnection, line: Line) -> float:
-        """Metres of a turn: those on connecting roads, without what crosswalks took from others."""
-        roads = [self._table.road_ids[self._table.lane_road[s.row]] for s in connection.alignment]
-        inside = [
-            float(arc[-1] - arc[0])
-            for road, arc in zip(roads, line.arc, strict=True)
-            if self._odr.roads[road].junction is not None
-        ]
-        return sum(inside) or line.length
+        bend = sharpest_bend(line.shape)
+        curve, heavy = (float(comfortable_speed(bend, share=share)) for share in (1.0, HEAVY))
+        if heavy >= BINDING * speed:
+            return round(speed, 2), math.inf
+        return round(min(speed, curve) if curve < BINDING * speed else speed, 2), round(heavy, 2)
 
     # Edges
 
@@ -565,6 +553,7 @@ class _NetworkBuilder:
                 lane.change_left,
                 lane.change_right,
                 self._origin_lanes(lane.alignment),
+                lane.heavy_speed,
             )
             for index, (lane, line) in enumerate(zip(plan.lanes, lines, strict=True))
         )

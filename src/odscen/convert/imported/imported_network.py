@@ -187,12 +187,27 @@ def imported_network(
     InputError
         If it is no network, or none of this map.
     """
-    lanes = geometric_table(read_network(net_xml), odr, table, walks)
-    fidelity = verify(net_xml, odr, table)
+    net = read_network(net_xml)
+    lanes = geometric_table(net, odr, table, walks)
+    for offset in _other_offsets(net.offset, odr):
+        # A map that was made of a network may have that network's coordinates, whatever its
+        # netOffset.
+        if lanes.intervals:
+            break
+        other = geometric_table(read_network(net_xml, offset=offset), odr, table, walks)
+        lanes = other if other.intervals else lanes
+    fidelity = verify(net_xml, odr, table, offset=lanes.net_offset)
     found, figures = import_findings(odr, table, lanes, fidelity)
     _refuse_stranger(figures, lanes)
     report = ConversionReport.of([*parser_entries(odr.notes), *entries, *found], figures)
     return SumoNetwork(net_xml, lanes, report)
+
+
+def _other_offsets(offset: tuple[float, float], odr: OpenDrive) -> tuple[tuple[float, float], ...]:
+    """Where SUMO's origin may be besides its netOffset, metres in the frame of the map."""
+    x, y, _, _ = odr.header.offset
+    moved = round(offset[0] + x, 6), round(offset[1] + y, 6)
+    return tuple(other for other in dict.fromkeys((moved, (0.0, 0.0))) if other != offset)
 
 
 def _refuse_stranger(figures: Mapping[str, float], lanes: LaneTable) -> None:

@@ -166,8 +166,13 @@ class ImportedNet:
         return tuple(sorted(pairs))
 
 
-def read_network(content: bytes) -> ImportedNet:
+def read_network(content: bytes, *, offset: tuple[float, float] | None = None) -> ImportedNet:
     """Read a ``.net.xml``.
+
+    Parameters
+    ----------
+    offset
+        SUMO position minus OpenDRIVE position, metres; the file's netOffset if not given.
 
     Raises
     ------
@@ -182,7 +187,9 @@ def read_network(content: bytes) -> ImportedNet:
     if root.find("location") is None:
         raise InputError("the SUMO network cannot be read: <location> is missing")
     try:
-        return _import_net(_with_sumolib(root), lefthand=root.get("lefthand") == "true")
+        return _import_net(
+            _with_sumolib(root), lefthand=root.get("lefthand") == "true", given=offset
+        )
     except (LookupError, ValueError, TypeError, AttributeError) as error:
         raise InputError(
             f"the SUMO network cannot be read: {type(error).__name__}: {error}"
@@ -205,8 +212,8 @@ def _with_sumolib(root: etree._Element) -> Any:
     return reader.getNet()
 
 
-def _import_net(net: Any, *, lefthand: bool) -> ImportedNet:
-    offset = tuple(float(value) for value in net.getLocationOffset())
+def _import_net(net: Any, *, lefthand: bool, given: tuple[float, float] | None) -> ImportedNet:
+    offset = given or tuple(float(value) for value in net.getLocationOffset())
     x0, y0, x1, y1 = (float(value) for value in net._location["convBoundary"].split(","))
     edges: dict[SumoEdgeId, ImportedEdge] = {}
     lanes: dict[SumoLaneId, ImportedLane] = {}

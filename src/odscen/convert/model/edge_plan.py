@@ -1,12 +1,14 @@
 """Edges: every road divided into stretches of unchanging lanes, one edge per driving direction.
 
 A road is cut where the lanes of its sections do not simply continue, where speed limits,
-permissions or the right to change lanes change, and at crosswalks, which become junctions of their
-own: cars give way to persons only where SUMO has a crossing, and crossings belong to junctions.
+permissions or the right to change lanes change, where a curve is driven slower, and at crosswalks,
+which become junctions of their own: cars give way to persons only where SUMO has a crossing, and
+crossings belong to junctions.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,6 +16,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.convert.model.access import allowed, speed, vehicle_classes
+from odscen.convert.model.curve_speed import (
+    BINDING,
+    HEAVY,
+    RoadCurves,
+    comfortable_speed,
+    speed_bands,
+)
 from odscen.convert.model.lane_alignment import LaneAlignment, Stretch
 from odscen.opendrive.lanes import LANE_CHANGE_DECREASE, LANE_CHANGE_INCREASE
 
@@ -144,6 +153,9 @@ NO_WIDTH = 0.05
 WIDTH_STEP = 0.5
 """Metres between the places at which widths are looked at."""
 
+LEAST_CURVE_CUT = 6.0
+"""Metres that the end of a curve must lie from the next cut to be one of its own."""
+
 MARKS_LEAST = 10.0
 """Metres: a stretch on which only the right to change lanes differs must be this long.
 
@@ -154,14 +166,20 @@ does within a few metres of broken line SUMO's drivers need the length of an edg
 
 @dataclass(frozen=True, slots=True)
 class EdgeLane:
-    """A lane to be; ``alignment`` runs in driving direction."""
+    """A lane to be; ``alignment`` runs in driving direction.
+
+    ``limit`` is the legal one, ``speed`` what is driven in its sharpest curve, if that is less, and
+    ``heavy_speed`` what trucks and buses drive there; infinite without a curve.
+    """
 
     alignment: LaneAlignment
     allowed: frozenset[str]
+    limit: float
     speed: float
     change_left: bool
     change_right: bool
     type: str
+    heavy_speed: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,14 +198,19 @@ class EdgePlan:
 
 
 class _LaneState(NamedTuple):
-    """What one lane is like between two cuts; equal ones can be joined."""
+    """What one lane is like between two cuts; equal ones can be joined.
+
+    ``curve`` is the speed of its sharpest curve, infinite if that is none to slow down for.
+    """
 
     row: int
     allowed: frozenset[str]
-    speed: float
+    limit: float
     change_left: bool
     change_right: bool
     type: str
+    curve: float
+    heavy: float
 
 
 class _RoadPart(NamedTuple):
@@ -239,6 +262,8 @@ class _Planner:
         self._table = table
         self._successors = successors
         self._lefthand = lefthand
+        outside = [road for road in odr.roads.values() if road.junction is None]
+        self._curves = RoadCurves(table, [table.road_index[road.id] for road in outside])
 
     def road(self, road: Road, gaps: Sequence[RoadGap]) -> list[EdgePlan]:
         row = self._table.road_index[road.id]
@@ -269,6 +294,7 @@ class _Planner:
         for place in sorted(others):
             if 0.0 < place < road.length and all(abs(place - s) >= LEAST_CUT for s in kept):
                 kept.append(place)
+        kept += self._curve_ends(road, row, kept)
         kept.sort()
         parts: list[_RoadPart] = []
         for start, end in pairwise(kept):
@@ -277,6 +303,32 @@ class _Planner:
                 continue
             parts.append(self._make_part(road, row, start, end))
         return parts
+
+    def _curve_ends(self, road: Road, row: int, kept: Sequence[float]) -> list[float]:
+        """Where another speed is driven because of a curve; not near a cut that is there anyway."""
+        table = self._table
+        first = int(table.section_first[row])
+        begin, end = table.section_lanes[[first, first + len(road.sections)]].tolist()
+        lanes = np.array(
+            [lane for lane in range(begin, end) if allowed(table.lane_type[lane])], dtype=np.int64
+        )
+        places = [*(kind.s for kind in road.types), *(section.s for section in road.sections), 0.0]
+        at = np.clip(np.array(places), 0.0, road.length)
+        kinds = [kind.type for kind in road.types] or [""]
+        highest = max(
+            (
+                speed(limit, table.lane_type[lane], kind)
+                for lane in lanes.tolist()
+                for limit in table.speed_limit(np.full(len(at), lane), at).tolist()
+                for kind in kinds
+            ),
+            default=0.0,
+        )
+        return [
+            place
+            for place in self._curves.cuts(row, highest)
+            if all(abs(place - s) >= LEAST_CURVE_CUT for s in kept)
+        ]
 
     def _make_part(self, road: Road, row: int, start: float, end: float) -> _RoadPart:
         table, middle = self._table, 0.5 * (start + end)
@@ -295,22 +347,28 @@ class _Planner:
         outer = table.lane_change_at(lanes, at)
         inner = table.inner_lane_change_at(lanes, at)
         limits = table.speed_limit(lanes, at)
+        centre = 0.5 * np.sum(table.lane_borders(lanes, at), axis=0)
+        bends = self._curves.lane_bends(row, centre, start, end)
+        curves, heavy = comfortable_speed(bends), comfortable_speed(bends, share=HEAVY)
         states: dict[bool, list[_LaneState]] = {True: [], False: []}
         # Rows ascend in lane id, from right to left as s grows.
         for index, lane in enumerate(rows):
             kind, forward = table.lane_type[lane], bool(table.lane_forward[lane])
             positive = table.lane_id[lane] > 0
             upper, lower = (outer, inner) if positive else (inner, outer)
+            limit = round(speed(float(limits[index]), kind, road_type), 2)
+            curve = float(curves[index])
             up = bool(upper[index] & LANE_CHANGE_INCREASE)
             down = bool(lower[index] & LANE_CHANGE_DECREASE)
             states[forward].append(
                 _LaneState(
                     lane,
                     self._classes_of_lane(lane, middle),
-                    round(speed(float(limits[index]), kind, road_type), 2),
+                    limit,
                     up if forward else down,
                     down if forward else up,
                     kind,
+                    *((curve, float(heavy[index])) if curve < BINDING * limit else (math.inf,) * 2),
                 )
             )
         right_first = (tuple(states[True]), tuple(reversed(states[False])))
@@ -374,7 +432,9 @@ class _Planner:
         )
 
     def _same_edge(self, one: _LaneState, other: _LaneState, *, marks: bool, forward: bool) -> bool:
-        if (one.allowed, one.speed, one.type) != (other.allowed, other.speed, other.type):
+        if (one.allowed, one.limit, one.type) != (other.allowed, other.limit, other.type):
+            return False
+        if speed_bands(one.curve) != speed_bands(other.curve):
             return False
         if marks and one[3:5] != other[3:5]:
             return False
@@ -406,10 +466,12 @@ class _Planner:
                 EdgeLane(
                     tuple(alignment),
                     state.allowed,
-                    state.speed,
+                    state.limit,
+                    round(min(state.limit, *(side[index].curve for side in sides)), 2),
                     any(side[index].change_left for side in sides),
                     any(side[index].change_right for side in sides),
                     state.type,
+                    round(min(side[index].heavy for side in sides), 2),
                 )
             )
         start, end = group[0].start, group[-1].end

@@ -6,6 +6,7 @@ in the OpenDRIVE frame: :attr:`Net.offset` is added when the file is written.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -55,6 +56,8 @@ class NetLane:
         Shape ``(K, 3)``; of walking areas and junctions the outline.
     change_left, change_right
         Whether road marks permit leaving the lane to that side.
+    heavy_speed
+        m/s, what trucks and buses drive in a curve; infinite where there is none.
     xodr
         OpenDRIVE lanes as ``road_lane``, for ``origId``.
     """
@@ -70,6 +73,7 @@ class NetLane:
     change_left: bool = True
     change_right: bool = True
     xodr: tuple[str, ...] = ()
+    heavy_speed: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,6 +88,11 @@ class NetEdge:
     name: str = ""
     priority: int = 1
     crosses: tuple[SumoEdgeId, ...] = ()
+
+    @property
+    def heavy_speed(self) -> float:
+        """m/s, what trucks and buses drive in its sharpest lane; infinite without a curve."""
+        return min(lane.heavy_speed for lane in self.lanes)
 
     @property
     def length(self) -> float:

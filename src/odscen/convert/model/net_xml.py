@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
 import numpy as np
 
+from odscen.convert.model.curve_speed import HEAVY_CLASSES
 from odscen.convert.model.net import DIGITS, INTERNAL, NORMAL
 from odscen.convert.model.net_shapes import border
 
@@ -24,6 +26,11 @@ VERSION = "1.20"
 def net_xml(net: Net) -> bytes:
     """Text of ``net.net.xml``; the same network gives the same bytes."""
     return _NetworkWriter(net).whole()
+
+
+def _curve_type(speed: float) -> str:
+    """Type of edges where trucks and buses are slower: SUMO knows restrictions of types only."""
+    return f"curve-{speed:.2f}"
 
 
 class _NetworkWriter:
@@ -46,6 +53,13 @@ class _NetworkWriter:
         ]
         inner = [edge for edge in net.edges if edge.function != NORMAL]
         outer = [edge for edge in net.edges if edge.function == NORMAL]
+        for speed in sorted({edge.heavy_speed for edge in net.edges} - {math.inf}):
+            lines.append(f'    <type id="{_curve_type(speed)}">')
+            lines += [
+                f'        <restriction vClass="{name}" speed="{speed:.2f}"/>'
+                for name in HEAVY_CLASSES
+            ]
+            lines.append("    </type>")
         for edge in (*inner, *outer):
             lines += self._edge_lines(edge)
         for light in net.lights:
@@ -69,6 +83,7 @@ class _NetworkWriter:
         kind = f' function="{edge.function}"' if edge.function != NORMAL else ""
         rank = f' priority="{edge.priority}"' if edge.function == NORMAL else ""
         name = f' name="{_quote_attribute(edge.name)}"' if edge.name else ""
+        curve = "" if edge.heavy_speed == math.inf else f' type="{_curve_type(edge.heavy_speed)}"'
         crossed = f' crossingEdges="{" ".join(edge.crosses)}"' if edge.crosses else ""
         shape, custom = "", ' customShape="1"'
         if edge.function == NORMAL:
@@ -76,7 +91,7 @@ class _NetworkWriter:
             shape = f' shape="{self._format_shape(border(inmost.shape, side * inmost.width))}"'
         elif edge.function == INTERNAL:
             custom = ""
-        yield f'    <edge id="{edge.id}"{ends}{kind}{rank}{name}{crossed}{shape}>'
+        yield f'    <edge id="{edge.id}"{ends}{kind}{rank}{curve}{name}{crossed}{shape}>'
         for lane in edge.lanes:
             change = "" if lane.change_left else ' changeLeft="emergency"'
             change += "" if lane.change_right else ' changeRight="emergency"'

@@ -7,8 +7,9 @@ meet, the first of these rules that distinguishes them decides:
 2. in a roundabout, what comes from outside gives way to what is inside;
 3. stop gives way to yield and yield to all others;
 4. ``<priority>`` of the OpenDRIVE junction;
-5. where lanes only merge, the faster road goes first; of equally fast ones who has another lane
-   beside makes room for who has not; where both or none have, vehicles go in turn;
+5. where lanes only merge, the faster road goes first; of equally fast ones a ramp gives way to a
+   main line with lanes beside, unless that is a carriageway of its own, which makes room for the
+   ramp; where both or none have lanes beside, vehicles go in turn;
 6. one who turns across gives way to oncoming traffic that does not;
 7. the major road, where there is one: junctions with lights, large ones and some others have
    (:mod:`odscen.convert.building.junction_ruling`);
@@ -262,15 +263,23 @@ def making_room(
 ) -> frozenset[tuple[int, int]]:
     """Pairs of movements into one lane of which the first makes room for the second.
 
-    A ramp has this lane only, the motorway others beside it that lead on. Going in turn, both slow
-    down to some 2 m/s and 800 vehicles an hour; where the ramp waits, the loops of a cloverleaf,
-    each of which leads to the next merge, lock for good.
+    A ramp has this lane only, the main line others beside it that lead on. The ramp waits, but on
+    a carriageway of its own, a motorway: going in turn, both slow down to some 2 m/s and 800
+    vehicles an hour; where the ramp waits, the loops of a cloverleaf, each of which leads to the
+    next merge, lock for good. There drivers of the motorway make room, as they do in reality.
     """
-    return frozenset(
-        (i, j) if _has_lane_beside(movements, i) else (j, i)
-        for i, j in _of_equal_right(movements, conflicts, rules)
-        if _has_lane_beside(movements, i) != _has_lane_beside(movements, j)
-    )
+    pairs = []
+    for i, j in _of_equal_right(movements, conflicts, rules):
+        if _has_lane_beside(movements, i) != _has_lane_beside(movements, j):
+            main, ramp = (i, j) if _has_lane_beside(movements, i) else (j, i)
+            pairs.append((ramp, main) if _is_two_way(movements, main) else (main, ramp))
+    return frozenset(pairs)
+
+
+def _is_two_way(movements: Sequence[Movement], number: int) -> bool:
+    """Whether other traffic comes the opposite way."""
+    heading = movements[number].heading_in
+    return any(abs(wrapped(other.heading_in - heading)) > OPPOSING for other in movements)
 
 
 def _has_lane_beside(movements: Sequence[Movement], number: int) -> bool:

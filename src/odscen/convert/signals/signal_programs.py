@@ -9,8 +9,9 @@ What must not meet never has green together. Times follow common practice:
 - all-red by the paths of those that end and of those that begin next, to where they meet
   (:mod:`odscen.convert.signals.shared_green`);
 - crossings turn red, while their stage goes on, so early that one who has just started walks over;
-- the cycle by Webster, (1.5 L + 5) / (1 - Y), and green in proportion to the flow ratios. No
-  demand is known when a map is converted: the flow ratios of all lanes are taken as equal.
+- the cycle by Webster, (1.5 L + 5) / (1 - Y), and equal greens: no demand is known when a map is
+  converted, and numbers of lanes say nothing of it. What other programs would gain or lose for
+  which loads of the main and the side road is in ``docs/signals.md``.
 """
 
 from __future__ import annotations
@@ -38,9 +39,6 @@ LEAST_GREEN = 8.0
 WALK_GREEN = 7.0
 """Seconds of green of a crossing, at least."""
 
-TURNING_SHARE = 0.5
-"""Flow ratio of a stage only for protected turns, as a share of that of others."""
-
 REST = 15.0
 """Seconds of red where a light has nothing to take turns with."""
 
@@ -61,15 +59,12 @@ class SignalGroup(NamedTuple):
         Whether it is a crossing.
     speed
         m/s of the approach.
-    turning
-        Whether all that it serves are protected turns across oncoming traffic.
     """
 
     links: tuple[int, ...]
     controller: str
     walkers: bool
     speed: float
-    turning: bool = False
 
     @property
     def yellow(self) -> float:
@@ -260,32 +255,24 @@ def _green_seconds(
     groups: Sequence[SignalGroup], order: Sequence[frozenset[int]], changes: Sequence[_Change]
 ) -> list[float]:
     """Seconds in which all of a stage are green."""
-    shares = [_flow_share(groups, stage) for stage in order]
+    cars = [any(not groups[g].walkers for g in stage) for stage in order]
     walks = sum(
-        WALK_GREEN + change.walk for share, change in zip(shares, changes, strict=True) if not share
+        WALK_GREEN + change.walk for some, change in zip(cars, changes, strict=True) if not some
     )
     lost = walks + sum(change.lost for change in changes)
     cycle = (1.5 * lost + 5.0) / (1.0 - FLOW_RATIO)
     cycle = min(max(cycle, SHORTEST_CYCLE), LONGEST_CYCLE)
-    unit = (cycle - lost) / max(sum(shares), 1e-9)
+    split = (cycle - lost) / max(sum(cars), 1)
     greens = []
-    for number, (stage, share, change) in enumerate(zip(order, shares, changes, strict=True)):
+    for number, (stage, some, change) in enumerate(zip(order, cars, changes, strict=True)):
         if not stage:
             greens.append(REST)
-        elif not share:
+        elif not some:
             greens.append(WALK_GREEN)
         else:
             only_cars = change.walk + changes[number - 1].late
-            greens.append(float(max(round(share * unit - only_cars), LEAST_GREEN)))
+            greens.append(float(max(round(split - only_cars), LEAST_GREEN)))
     return greens
-
-
-def _flow_share(groups: Sequence[SignalGroup], stage: frozenset[int]) -> float:
-    """Flow ratio of a stage against that of one for a whole approach; 0 without vehicles."""
-    cars = [groups[g] for g in stage if not groups[g].walkers]
-    if not cars:
-        return 0.0
-    return TURNING_SHARE if all(group.turning for group in cars) else 1.0
 
 
 def _stage_state(stages: Stages, stage: frozenset[int], links: int) -> str:

@@ -267,7 +267,13 @@ _MIN_WIDTH = 0.05
 _MIN_GAP = 1.0
 
 
-def verify(net_xml: bytes, odr: OpenDrive, table: RoadTable) -> Fidelity:
+def verify(
+    net_xml: bytes,
+    odr: OpenDrive,
+    table: RoadTable,
+    *,
+    offset: tuple[float, float] | None = None,
+) -> Fidelity:
     """Compare a SUMO network with the map it was made from.
 
     Parameters
@@ -276,13 +282,15 @@ def verify(net_xml: bytes, odr: OpenDrive, table: RoadTable) -> Fidelity:
         Text of the ``.net.xml``.
     odr, table
         Road model of the map and its evaluation.
+    offset
+        SUMO position minus OpenDRIVE position, metres; the network's netOffset if not given.
 
     Raises
     ------
     InputError
         If the network cannot be read.
     """
-    net = read_net(net_xml)
+    net = read_net(net_xml, offset=offset)
     drivable = _MapLanes(odr, table, DRIVABLE_TYPES)
     walkable = _MapLanes(odr, table, WALKABLE_TYPES)
     drives = net.driving("normal", "internal")

@@ -17,7 +17,7 @@ from odscen.base.errors import InputError
 from odscen.base.xml_reading import read_xml
 
 if TYPE_CHECKING:
-    from collections.abc import Container, Iterator
+    from collections.abc import Iterator, Mapping
 
     from lxml import etree
 
@@ -121,8 +121,13 @@ class NetFile(NetConnections):
         return [ln for ln in self.lanes.values() if ln.drives and ln.function in functions]
 
 
-def read_net(content: bytes) -> NetFile:
+def read_net(content: bytes, *, offset: tuple[float, float] | None = None) -> NetFile:
     """Read a ``.net.xml``.
+
+    Parameters
+    ----------
+    offset
+        SUMO position minus OpenDRIVE position, metres; the file's netOffset if not given.
 
     Raises
     ------
@@ -137,7 +142,7 @@ def read_net(content: bytes) -> NetFile:
             links=known.links,
             junctions=known.junctions,
             left_hand=root.get("lefthand") == "true",
-            lanes=_read_lanes(root),
+            lanes=_read_lanes(root, offset),
             programs=tuple(
                 NetFileProgram(
                     _required_text(logic, "id"),
@@ -179,11 +184,12 @@ def _refuse_unreadable() -> Iterator[None]:
         ) from error
 
 
-def _read_lanes(root: etree._Element) -> dict[str, NetFileLane]:
+def _read_lanes(root: etree._Element, given: tuple[float, float] | None) -> dict[str, NetFileLane]:
     location = root.find("location")
     if location is None:
         raise ValueError("<location> is missing")
-    offset = np.array([float(part) for part in _required_text(location, "netOffset").split(",")])
+    text = _required_text(location, "netOffset")
+    offset = np.array(given or [float(part) for part in text.split(",")])
     lanes: dict[str, NetFileLane] = {}
     for edge in root.iterfind("edge"):
         for lane in edge.iterfind("lane"):
@@ -223,12 +229,19 @@ def _lane_allows(lane: etree._Element, vclass: str) -> bool:
 
 
 def _read_links(
-    root: etree._Element, edges: dict[str, dict[str, str]], known: Container[str]
+    root: etree._Element, edges: dict[str, dict[str, str]], known: Mapping[str, str]
 ) -> Iterator[NetFileLink]:
     for link in root.iterfind("connection"):
         via = link.get("via", "")
         if via and via not in known:
             raise ValueError(f"connection via {via}, which is no lane")
+        source = edges[_required_text(link, "from")]
+        if link.get("fromLane") not in source and known.get(next(iter(source.values()), "")) != (
+            "normal"
+        ):
+            # Networks have inner lanes that were taken out with their connections left; SUMO
+            # passes over these, too.
+            continue
         yield NetFileLink(
             edges[_required_text(link, "from")][_required_text(link, "fromLane")],
             edges[_required_text(link, "to")][_required_text(link, "toLane")],

@@ -96,6 +96,10 @@ class NetFacts:
         ``lane`` and ``following``: lanes, those in junctions included, by which one drives on.
     shapes
         Points of the centre line of each lane, ``(K, 2)``, metres, SUMO's frame.
+    widths
+        Metres, of the lanes that vehicles use.
+    inside
+        Lanes inside junctions.
     made
         What :meth:`once` has made; facts of other runs on the same map share it.
     """
@@ -105,6 +109,8 @@ class NetFacts:
     drivers: pl.DataFrame
     follows: pl.DataFrame = field(default_factory=no_links)
     shapes: Mapping[str, FloatArray] = field(default_factory=dict)
+    widths: Mapping[str, float] = field(default_factory=dict)
+    inside: frozenset[str] = frozenset()
     made: dict[str, tuple[LanePlaces, Any]] = field(default_factory=dict, repr=False)
 
     def once(self, name: str, places: LanePlaces, make: Callable[[], _Made]) -> _Made:

@@ -81,6 +81,7 @@ class Basis(StrEnum):
     SIGNALS = "signals"
     STOPS = "stops"
     PARKING = "parking"
+    MOTION = "motion"
 
 
 class SummaryPart(StrEnum):
@@ -100,6 +101,7 @@ class ReportSection(StrEnum):
     SIGNALS = "traffic lights"
     TRANSIT = "public transport"
     PARKING = "parking"
+    MOTION = "motion"
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +149,9 @@ class RunData:
         if the scenario has no lines of public transport.
     parking
         Use of parking areas; ``None`` if no trip parks.
+    motion
+        From :func:`odscen.figures.measures.motion.check_motion`; ``None`` if trajectories were not
+        recorded, or too seldom.
     stations
         From :func:`odscen.figures.by_place.station_figures.station_figures`; ``None`` if the study
         has none, or trajectories were not recorded.
@@ -161,6 +166,7 @@ class RunData:
     visits: pl.DataFrame | None = None
     stations: pl.DataFrame | None = None
     parking: ParkingUse | None = None
+    motion: pl.DataFrame | None = None
 
     @cached_property
     def kept(self) -> dict[str, Any]:
@@ -192,6 +198,7 @@ class RunData:
             Basis.SIGNALS: self.signals is not None,
             Basis.STOPS: self.visits is not None,
             Basis.PARKING: self.parking is not None,
+            Basis.MOTION: self.motion is not None,
         }[basis]
 
 

@@ -12,6 +12,7 @@ from odscen.figures.measures import (
     emissions,
     insertion,
     latent_delay,
+    motion,
     outcome_counts,
     place_figures,
     reliability,
@@ -45,6 +46,7 @@ RUN_FIGURES: tuple[RunFigure, ...] = (
     *reliability.FIGURES,
     *throughput.FIGURES,
     *safety.FIGURES,
+    *motion.FIGURES,
     *signal_use.FIGURES,
     *timetable.FIGURES,
 )
@@ -57,7 +59,7 @@ COLUMN_UNITS = {column.name: column.unit for column in table_columns.COLUMNS}
 
 COUNTS = tuple(figure.name for figure in RUN_FIGURES if figure.count)
 
-_ON_DEMAND = (Basis.CONFLICTS, Basis.STOPS, Basis.PARKING)
+_ON_DEMAND = (Basis.CONFLICTS, Basis.STOPS, Basis.PARKING, Basis.MOTION)
 
 _BY_NAME: dict[tuple[FigureKind, str], Figure] = {
     (figure.kind, figure.name): figure for figure in ALL_FIGURES

@@ -309,6 +309,8 @@ def _cut_off(scenario: Scenario, region: Region, places: PlaceNames) -> Iterator
     for mask, routes in asked.values():
         stranded |= {route.actor: route.closing for route in _without_way(region, mask, routes)}
     for index, closing in sorted(stranded.items()):
+        if all(getattr(measure, "destinations", "leave") != "leave" for measure in closing):
+            continue
         actor = scenario.actors[index]
         names = some_of([repr(measure.id) for measure in closing], between=", ")
         message = (

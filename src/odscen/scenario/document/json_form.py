@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 OPTIONAL = (
     "variant", "drivers", "demand", "transit", "signals", "measures", "study", "rules",
-    "criteria", "parameters", "formulas",
+    "criteria", "sumo", "parameters", "formulas",
 )  # fmt: skip
 """Fields of a scenario that are left out where they have their default value."""
 ALWAYS = ("duration", "step_length")

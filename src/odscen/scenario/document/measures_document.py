@@ -34,10 +34,16 @@ class TimedMeasure(Part):
 
 
 class RoadClosure(TimedMeasure):
-    """Segments, lanes or turns that no vehicle enters; who is on them drives out."""
+    """Segments, lanes or turns that no vehicle enters; who is on them drives out.
+
+    ``destinations`` says what becomes of trips to what is closed: the vehicle is taken out at once
+    (``leave``), the trip ends on the last open road before it (``end``), or the vehicle waits
+    there beside the road until the closure ends (``wait``).
+    """
 
     kind: Literal["closure"]
     places: Places
+    destinations: Literal["leave", "end", "wait"] = "leave"
 
 
 class Roadworks(TimedMeasure):

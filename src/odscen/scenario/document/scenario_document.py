@@ -30,6 +30,7 @@ from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.measures_document import Measure
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.signals_document import Signals
+from odscen.scenario.document.sumo_document import SumoProject
 
 if TYPE_CHECKING:
     from pydantic.config import JsonDict
@@ -619,6 +620,8 @@ class Scenario(Part):
         What actors do, and when.
     criteria
         What must come out of a run for it to pass, as expectations of a suite are written.
+    sumo
+        Files and options of a SUMO project, which run with the scenario as they are.
     parameters
         Named numbers that others are computed from.
     formulas
@@ -648,6 +651,7 @@ class Scenario(Part):
     study: Study = Study()
     rules: tuple[StoryRule, ...] = ()
     criteria: Annotated[tuple[Criterion, ...], Field(max_length=200)] = ()
+    sumo: SumoProject | None = None
     parameters: dict[ParameterName, Parameter] = Field(default_factory=dict, max_length=200)
     formulas: dict[str, str] = Field(default_factory=dict)
 

@@ -207,7 +207,7 @@ GOAL = "goal"
 
 _JSON = (
     "variant", "roi", "environment", "drivers", "demand", "transit", "signals", "measures",
-    "simulation", "study", "rules", "criteria", "parameters", "formulas",
+    "simulation", "study", "rules", "criteria", "sumo", "parameters", "formulas",
 )  # fmt: skip
 """Graph attributes that hold JSON."""
 

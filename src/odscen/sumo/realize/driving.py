@@ -55,12 +55,13 @@ KINDS: dict[Category, CategoryTraits] = {
         "bus", 27.78, 1.2, 4.0, 7.0, "bus", "HBEFA4/UBus_Std_gt15-18t_Euro-VI_A-C"
     ),
     Category.MOTORCYCLE: CategoryTraits(
-        "motorcycle", 55.56, 6.0, 10.0, 10.0, "motorcycle", "HBEFA4/MC_4S_gt250cc_Euro-3"
+        "motorcycle", 55.56, 6.0, 4.5, 10.0, "motorcycle", "HBEFA4/MC_4S_gt250cc_Euro-3"
     ),
     Category.BICYCLE: CategoryTraits("bicycle", 5.56, 1.2, 3.0, 7.0, "bicycle", "Zero"),
     Category.PEDESTRIAN: CategoryTraits("pedestrian", 1.39, 1.5, 2.0, 5.0, "pedestrian", "Zero"),
 }
-"""Bicycles and pedestrians: the speed they usually go at, 20 and 5 km/h.
+"""Bicycles and pedestrians: the speed they usually go at, 20 and 5 km/h. Motorcycles brake as cars
+do, and as SUMO has them in emergencies only.
 
 Emissions: https://sumo.dlr.de/docs/Models/Emissions/HBEFA4-based.html; the classes that SUMO 1.28
 itself takes, but for motorcycles, of which it takes those from before 1999.
@@ -104,6 +105,9 @@ PASSING = 0.57
 NORMAL_DRIVERS = Drivers()
 WALKING_DEVIATION = 0.1
 """Of the speed factor of pedestrians for whom no speed is given."""
+LATERAL_SHARE = 0.3
+"""Of its speed that a vehicle moves aside at most, so that it does not while it is stopped: 17
+degrees of heading."""
 ALWAYS = 1_000_000
 """Seconds after the beginning of red in which it is not heeded; more than any red lasts."""
 TWO_WHEELER_MIN_GAP = 0.5
@@ -251,6 +255,8 @@ def driver(
         ("tau", number(max(values.pop("tau"), step_length) * weather.headway)),
         ("sigma", number(values.pop("sigma"))),
         ("minGap", number(values.pop("minGap"))),
+        ("lcMaxSpeedLatStanding", "0"),
+        ("lcMaxSpeedLatFactor", number(LATERAL_SHARE)),
         *((name, number(values[name])) for name in DRIVER_PARAMETERS if name in values),
         (
             "emissionClass",

@@ -19,6 +19,7 @@ from odscen.runs.layout import (
     CLOSURES_FILE,
     CONFIG_FILE,
     MEASURES_FILE,
+    NET_FILE,
     PARKING_FILE,
     REGION_FILE,
     ROUTES_FILE,
@@ -39,6 +40,7 @@ from odscen.sumo.realize.lights.light_realization import realized_lights
 from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.lights.program_files import signals_xml
 from odscen.sumo.realize.measure_files import interval_of, measures_xml
+from odscen.sumo.realize.project_files import allowed_options, project_files
 from odscen.sumo.realize.road_users.departures import demand_users, road_users
 from odscen.sumo.realize.road_users.free_flow import environment_effect
 from odscen.sumo.realize.road_users.planned_users import RoadUserWriter
@@ -68,14 +70,21 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import Int32Array
     from odscen.records.light_programs import LightProgram
+    from odscen.records.run_plan import PlannedActor
     from odscen.runs.run_settings import RunSettings, SliceLength
     from odscen.scenario.document.scenario_document import Scenario, Simulation
     from odscen.sumo.realize.lights.light_realization import RealizedLight
+    from odscen.sumo.realize.project_files import ProjectFiles
     from odscen.sumo.realize.road_user import RoadUser
     from odscen.sumo.realize.road_users.free_flow import ModelSizes
     from odscen.sumo.realize.sumo_map import SumoMap
     from odscen.sumo.realize.transit.parking_places import ParkingPosition
 
+RUN_FILES = (
+    CLOSURES_FILE, CONFIG_FILE, MEASURES_FILE, NET_FILE, PARKING_FILE, REGION_FILE, ROUTES_FILE,
+    SIGNALS_FILE, STOPS_FILE, STORY_FILE,
+)  # fmt: skip
+"""Names of files that a run may have of odscen."""
 _HOUR = 3600.0
 _SLICES, _MOST_HOURS = 6, 4
 
@@ -148,15 +157,26 @@ def realize(
     if not settings.meso and any(actor.crosses_anywhere for actor in scenario.actors):
         walkable = usable_places(sumo_map).walkable
         writer.roads = None if walkable is None else RoadsAcross(sumo_map, region, walkable)
+    project = None
+    if scenario.sumo is not None:
+        project = project_files(scenario.sumo, sumo_map, until=until, taken=RUN_FILES)
+        _refuse_twins((*users, *project.actors))
+    actors = writer.add(users)
+    if project is not None:
+        actors = tuple(
+            sorted((*actors, *project.actors), key=lambda actor: (actor.depart, actor.id))
+        )
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
         until=until,
         step_length=step_length,
         net_offset=sumo_map.net_offset,
-        actors=writer.add(users),
+        actors=actors,
         elevation=sumo_map.elevation,
-        slice_length=slices_of(until, settings.slice_length, step_length),
+        slice_length=None  # SUMO's own flows and routes of a file have no slices
+        if project is not None
+        else slices_of(until, settings.slice_length, step_length),
         trajectories=recording.trajectories,
         measures=actions.measures,
         closed=actions.closed,
@@ -185,8 +205,20 @@ def realize(
             lights,
             stops=bool(stops),
             closures=actions.xml,
+            project=project,
+            begin=0.0 if scenario.sumo is None else scenario.sumo.begin,
+            options=None
+            if scenario.sumo is None
+            else {
+                # Trips of the project may find no route where measures close their roads.
+                **({"ignore-route-errors": "true"} if actions.closed else {}),
+                **allowed_options(scenario.sumo.options),
+            },
         ),
     }
+    if project is not None:
+        files |= project.texts
+        writer.notes += project.notes
     if settings.meso and asked.demand.parking.used:
         writer.notes.append("meso: no trip begins or ends in a parking place")
     if scenario.rules and settings.meso:
@@ -231,6 +263,9 @@ def _run_files(
     *,
     stops: bool,
     closures: str | None,
+    project: ProjectFiles | None = None,
+    begin: float = 0.0,
+    options: Mapping[str, str] | None = None,
 ) -> dict[str, str]:
     """What SUMO reads beside network and routes; ``signals`` are programs that differ.
 
@@ -254,6 +289,10 @@ def _run_files(
         action_step=own.action_step,
         lateral_resolution=own.lateral_resolution,
         pedestrians=own.pedestrians,
+        begin=begin,
+        routes=() if project is None else project.routes,
+        additional=() if project is None else project.additional,
+        options=options,
     )
     analysed = [value for value in (plan.warm_up, plan.interval) if value]
     interval = interval_of(plan.until, plan.slice_length, analysed=analysed)
@@ -314,7 +353,7 @@ def _in_order(users: Iterable[RoadUser]) -> tuple[RoadUser, ...]:
     return tuple(sorted(users, key=lambda user: (user.depart, user.id)))
 
 
-def _refuse_twins(users: tuple[RoadUser, ...]) -> None:
+def _refuse_twins(users: Sequence[RoadUser | PlannedActor]) -> None:
     """Flow members are named ``<flow>.<k>``, which an actor's own id may equal."""
     twins = sorted(name for name, n in Counter(user.id for user in users).items() if n > 1)
     if twins:

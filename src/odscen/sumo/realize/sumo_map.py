@@ -75,6 +75,30 @@ class SumoMap:
         known |= lanes.lanes.lengths <= SHORT
         return known[lanes.lane]
 
+    @cached_property
+    def edge_nodes(self) -> dict[str, Int32Array]:
+        """Nodes of the lane graph on the lanes of each SUMO edge, junctions left out."""
+        places = self.lane_places
+        order = np.argsort(places.lane, kind="stable")
+        rows, starts = np.unique(places.lane[order], return_index=True)
+        groups: dict[str, list[Int32Array]] = {}
+        for row, nodes in zip(rows.tolist(), np.split(order, starts[1:]), strict=True):
+            if row < 0:
+                continue
+            lane = self.net.lanes[places.lanes[row]]
+            if not lane.internal:
+                groups.setdefault(lane.edge, []).append(nodes.astype(np.int32))
+        return {edge: np.sort(np.concatenate(parts)) for edge, parts in groups.items()}
+
+    @cached_property
+    def edge_ends(self) -> dict[str, tuple[int, int]]:
+        """First and last node on each SUMO edge outside junctions."""
+        pos = self.lane_places.pos
+        return {
+            edge: (int(nodes[np.argmin(pos[nodes])]), int(nodes[np.argmax(pos[nodes])]))
+            for edge, nodes in self.edge_nodes.items()
+        }
+
     @classmethod
     def of(cls, graph: MapGraph, table: LaneTable, *, parking: MapParking = NO_PARKING) -> SumoMap:
         """Bring graph and lane table together."""

@@ -6,6 +6,7 @@ Paths are relative to the file. What each setting is for is said in ``docs/runs.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
 from odscen.figures.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC, WATCHED_ON
@@ -26,8 +27,19 @@ from odscen.runs.layout import (
 )
 from odscen.runs.recording import REGION_ID, Recording
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 POSITIONS_EVERY = 5.0
 """Seconds between the positions of a run without trajectories, which are not kept."""
+
+LANE_CHANGE = 3.0
+"""Seconds that a change of lanes takes; Toledo and Zohar, "Modeling duration of lane changes",
+Transportation Research Record 1999, 2007, have 1 to 13 s with a mean of 4.6 s.
+
+Vehicles are on both lanes meanwhile. Slow ones take longer, see
+:data:`odscen.sumo.realize.driving.LATERAL_SHARE`. SUMO's sublane model moves by itself.
+"""
 
 SQUEEZE = 120.0
 """Seconds after which persons who stand in each other's way squeeze past; SUMO waits 300 s.
@@ -60,6 +72,13 @@ REROUTING = {
 
 Travel times are means of the last 3 min, and a route is changed for one that is a tenth quicker.
 """
+
+
+_NOT_OF_PROJECTS = (
+    "ignore-route-errors", "collision.action", "collision.mingap-factor",
+    "collision.check-junctions", "intermodal-collision.action", "pedestrian.striping.jamtime",
+)  # fmt: skip
+"""What a SUMO project has as SUMO itself has it, so that it runs as it did before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +115,13 @@ class SumocfgSettings:
         Queues on road sections instead of single vehicles that follow each other: for scale.
     informed
         Whether there are drivers who look for quicker routes on the way.
+    begin
+        When the simulation begins, s.
+    routes, additional
+        Further files, of a SUMO project.
+    options
+        Options of a SUMO project; ``None`` without one. With one SUMO's own defaults hold where it
+        says nothing.
     """
 
     until: float
@@ -114,13 +140,17 @@ class SumocfgSettings:
     measures: bool = False
     meso: bool = False
     informed: bool = False
+    begin: float = 0.0
+    routes: tuple[str, ...] = ()
+    additional: tuple[str, ...] = ()
+    options: Mapping[str, str] | None = None
 
 
 def sumo_config(settings: SumocfgSettings) -> str:
     """Text of ``scenario.sumocfg``."""
     recording = settings.recording
-    inputs = {"net-file": NET_FILE, "route-files": ROUTES_FILE}
-    additional = [SIGNALS_FILE] if settings.signals else []
+    inputs = {"net-file": NET_FILE, "route-files": ",".join((*settings.routes, ROUTES_FILE))}
+    additional = [*settings.additional, *([SIGNALS_FILE] if settings.signals else [])]
     if settings.stops:
         additional.append(STOPS_FILE)
     additional += [PARKING_FILE] if settings.parking else []
@@ -135,7 +165,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
         "input": inputs,
         "output": _output_options(settings),
         "time": {
-            "begin": "0",
+            "begin": f"{settings.begin:g}",
             "end": f"{settings.until:g}",
             "step-length": f"{settings.step_length:g}",
         },
@@ -149,7 +179,11 @@ def sumo_config(settings: SumocfgSettings) -> str:
             "pedestrian.striping.jamtime": f"{SQUEEZE:g}",
             "time-to-teleport": f"{settings.time_to_teleport or -1.0:g}",
             **_optional_value("default.action-step-length", settings.action_step),
-            **_optional_value("lateral-resolution", settings.lateral_resolution),
+            **(
+                {"lanechange.duration": f"{LANE_CHANGE:g}"}
+                if settings.lateral_resolution is None
+                else {"lateral-resolution": f"{settings.lateral_resolution:g}"}
+            ),
         },
         "random_number": {"seed": str(settings.seed)},
         "report": {
@@ -159,8 +193,14 @@ def sumo_config(settings: SumocfgSettings) -> str:
             "xml-validation": "never",
         },
     }
+    if settings.options is not None:
+        own = sections["processing"]
+        for name in _NOT_OF_PROJECTS:
+            own.pop(name)
+        own |= {name: value for name, value in settings.options.items() if name not in own}
     if settings.informed:
-        sections["routing"] = REROUTING
+        given = settings.options or {}
+        sections["routing"] = {n: v for n, v in REROUTING.items() if n not in given}
     if recording.criticality:
         sections["ssm_device"] = {**SSM_OPTIONS, "device.ssm.file": SSM_FILE}
     if settings.meso:
@@ -171,7 +211,8 @@ def sumo_config(settings: SumocfgSettings) -> str:
         }
         # The striping model needs lanes with places on them, which meso does not keep.
         sections["processing"]["pedestrian.model"] = "nonInteracting"
-        sections["processing"].pop("lateral-resolution", None)
+        for option in ("lateral-resolution", "lanechange.duration"):
+            sections["processing"].pop(option, None)
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', "<sumoConfiguration>"]
     for section, options in sections.items():
         lines.append(f"    <{section}>")

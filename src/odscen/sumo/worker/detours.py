@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import heapq
+import math
 from collections import defaultdict
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -37,6 +39,7 @@ class Detours:
             for (source, target), seconds in sorted(pairs.items()):
                 onwards[source].append((target, seconds))
             self._onwards[vclass] = onwards
+        self._quickest = quickest
         self._closed: Pairs = frozenset()
         self._known: dict[tuple[str, str, str], tuple[str, ...] | None] = {}
 
@@ -63,6 +66,11 @@ class Detours:
                 route += part[1:]
         rest = self.find(route[-1], goals[-1], vclass, closed)
         return None if rest is None else route + rest[1:]
+
+    def seconds(self, route: Sequence[str], vclass: str) -> float:
+        """Seconds in free flow from the end of the first edge of a route to that of the last."""
+        quickest = self._quickest[vclass]
+        return sum(quickest.get(pair, math.inf) for pair in pairwise(route))
 
     def _search_detour(
         self, source: str, goal: str, vclass: str, closed: Pairs

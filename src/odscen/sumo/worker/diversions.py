@@ -1,7 +1,8 @@
 """What measures of the scenario do during a run: who finds a turn closed takes another route.
 
 When a closure begins every driver knows of it: those on the road whose route leads over what is
-closed take the quickest other one in free flow, and so do those who depart later. Who has none is
+closed take the quickest other one in free flow, and so do those who depart later. Who has none, as
+the goal is closed, ends the trip or waits before it if the measure says so; all others are
 stranded, and taken out. SUMO's rerouters close the lanes, in plain ``sumo`` too; but they know no
 closed turns, and end trips to a closed goal anywhere.
 """
@@ -18,8 +19,9 @@ from odscen.sumo.worker.detours import Detours
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from odscen.records.run_plan import Plan
+    from odscen.records.run_plan import ClosedPeriod, Plan
     from odscen.sumo.worker.detours import Pairs
+    from odscen.sumo.worker.simulation.observed import RouteAhead
     from odscen.sumo.worker.simulation.session import Session
 
 
@@ -41,10 +43,21 @@ class Diversions:
         self._names = [name for _, name in vehicles]
         self._informed = frozenset(actor.id for actor in plan.actors if actor.informed)
         self._pairs: Mapping[str, Pairs] = {}
+        self._periods: Mapping[str, ClosedPeriod] = {}
         self._detours: Detours | None = None
         self._inside: set[str] = set()
         self._cut_off: set[str] = set()
         self._begun = False
+
+    @property
+    def detours(self) -> Detours | None:
+        """Finds routes, if any measure closes something."""
+        return self._detours
+
+    @property
+    def closed_pairs(self) -> dict[str, Pairs]:
+        """By class of vehicles: edges between which they may not drive now."""
+        return dict(self._pairs)
 
     def before_step(self, session: Session, begin: float, length: float) -> list[Event]:
         """Act before the step from ``begin`` that lasts ``length`` (s); what happened."""
@@ -97,6 +110,7 @@ class Diversions:
         """Know what is closed in the step that ends at ``end``."""
         active = [period for period in self._closed if period.begin < end and period.end >= end]
         self._pairs = {period.vclass: frozenset(period.pairs) for period in active}
+        self._periods = {period.vclass: period for period in active}
         self._inside = set()
 
     def _departing_between(self, begin: float, end: float) -> list[str]:
@@ -123,12 +137,35 @@ class Diversions:
             route = self._detours.by_stops(ahead.edges[0], goals, vclass, closed)
             if route is not None and session.set_route(name, ahead.start + route):
                 continue
+            if self._stop_before_goal(session, name, vclass, ahead, closed):
+                continue
             if session.has_departed(name):
                 events.append(self._strand_vehicle(session, name, time))
             else:  # SUMO does not bear that a vehicle is taken out before it has departed
                 session.set_route(name, ahead.start + ahead.edges[:last])
                 self._cut_off.add(name)
         return events
+
+    def _stop_before_goal(
+        self, session: Session, name: str, vclass: str, ahead: RouteAhead, closed: Pairs
+    ) -> bool:
+        """Let a trip to a closed goal end, or wait, on the last open edge; whether it does."""
+        period, goal = self._periods[vclass], ahead.edges[-1]
+        until = dict(period.waits).get(goal)
+        if self._detours is None or (until is None and goal not in period.ends):
+            return False
+        stops = session.stop_edges(name)
+        for last in range(len(ahead.edges) - 2, -1, -1):
+            edge = ahead.edges[last]
+            goals = (*(stop for stop in stops if stop != edge), edge)
+            route = self._detours.by_stops(ahead.edges[0], goals, vclass, closed)
+            if route is None:
+                continue
+            if until is None:
+                return session.set_route(name, ahead.start + route)
+            whole = ahead.start + route + ahead.edges[last + 1 :]
+            return session.set_route(name, whole) and session.park_until(name, edge, until)
+        return False
 
     def _strand_departed(self, session: Session, time: float) -> list[Event]:
         """Take out those who found no route when they were to depart, and have departed now."""

@@ -301,7 +301,7 @@ class Recorder:
         x, y = body_centre(
             front.x, front.y, front.angle_deg, length=length, net_offset=self._offset
         )
-        placed = planned is not None and planned.begins_in is None
+        placed = planned is not None and planned.begins_in is None and not planned.from_file
         error = math.hypot(x - planned.x, y - planned.y) if planned and placed else None
         self._events.append(Event(time, EventKind.DEPARTED, name, x=x, y=y, error=error))
 

@@ -6,8 +6,10 @@ import time
 from typing import TYPE_CHECKING
 
 from odscen.runs.reporter import Progress
+from odscen.sumo.worker.detours import Detours
 from odscen.sumo.worker.diversions import Diversions
 from odscen.sumo.worker.lockstep import LockstepWatch
+from odscen.sumo.worker.missed_lanes import PATIENCE, MissedLanes
 from odscen.sumo.worker.recorder import Recorder
 
 if TYPE_CHECKING:
@@ -63,6 +65,8 @@ class Stepper:
         self.steps = 0
         self._plan = plan
         self._diversions = Diversions(plan) if plan.measures else None
+        self._missed_lanes = MissedLanes(plan.net_offset)
+        self._detours: Detours | None = None
         self._send = send
         self._watch = watch
         self._led = watch if isinstance(watch, LockstepWatch) and watch.rules else None
@@ -125,6 +129,8 @@ class Stepper:
         recorder = self.recorder
         if self._diversions is not None:
             recorder.add(self._diversions.before_step(session, now, self._plan.step_length))
+        if self._missed_lanes.due(now, self._plan.step_length):
+            self._change_routes(session, now)
         if self.behaviour is not None:
             self.behaviour.before_step(session, self._moved_by_others())
         after = session.step()
@@ -135,6 +141,19 @@ class Stepper:
             self._take_rules(session)
         self.steps += 1
         return after
+
+    def _change_routes(self, session: Session, now: float) -> None:
+        """Let those who did not get to the lane of their route take another one."""
+        if not session.stopped.longer_than(PATIENCE):
+            return
+        diversions = self._diversions
+        if diversions is not None and diversions.detours is not None:
+            detours, closed = diversions.detours, diversions.closed_pairs
+        else:
+            self._detours = self._detours or Detours(session.lanes.links())
+            detours, closed = self._detours, {}
+        moved = self._moved_by_others()
+        self.recorder.add(self._missed_lanes.before_step(session, now, detours, closed, moved))
 
     def _moved_by_others(self) -> Collection[str]:
         """Who is moved by rules or by another program."""

@@ -59,6 +59,9 @@ class ClosedLanes:
     end: float
     lanes: tuple[str, ...]
     banned: frozenset[str]
+    destinations: str = "leave"
+    inside: frozenset[str] = frozenset()
+    """Edges of the places, for what becomes of trips to them."""
 
 
 @dataclass(frozen=True)
@@ -155,6 +158,7 @@ def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> M
             end_of(measure, until),
             found.closed_by(closed_places(measure)),
             frozenset(KINDS[category].vclass for category in banned_by(measure)),
+            *_destinations(measure, found),
         )
         for measure in active
         if isinstance(measure, RoadClosure | Roadworks | ChangedPermission)
@@ -182,6 +186,14 @@ def narrowed(width: float) -> float:
     """What a lane of so many metres takes off the free-flow speed, m/s."""
     less = next((kmh for least, kmh in NARROW if width >= least), NARROW[-1][1])
     return less / 3.6
+
+
+def _destinations(measure: Measure, found: MeasuredLanes) -> tuple[str, frozenset[str]]:
+    """What becomes of trips to what a measure closes, and the edges that it closes."""
+    if not isinstance(measure, RoadClosure) or measure.destinations == "leave":
+        return "leave", frozenset()
+    lanes = (found.net.lanes[lane] for place in measure.places for lane in found.lanes(place))
+    return measure.destinations, frozenset(lane.edge for lane in lanes if not lane.internal)
 
 
 def _begin_and_id(measure: PlannedMeasure) -> tuple[float, str]:
@@ -265,8 +277,13 @@ def _closed_periods(
                 if closing.begin <= begin and end <= closing.end and vclass in closing.banned
                 for lane in closing.lanes
             )
+            active = [c for c in closings if c.begin <= begin and end <= c.end]
+            ends = {e for c in active if c.destinations == "end" for e in c.inside}
+            waits = {e: c.end for c in active if c.destinations == "wait" for e in c.inside}
             if pairs := found.broken_links(closed, vclass):
-                yield ClosedPeriod(begin, end, vclass, pairs)
+                yield ClosedPeriod(
+                    begin, end, vclass, pairs, tuple(sorted(ends)), tuple(sorted(waits.items()))
+                )
 
 
 def _plan_measure(

@@ -42,6 +42,20 @@ class RoadLanes:
         allowed = self._sumo.lane.getAllowed(lane)
         return not allowed or kind in allowed
 
+    def onwards(self, lane: str, kind: str) -> list[tuple[str, str]]:
+        """Lanes that a lane leads to and vehicles of a class may enter now, with their edges."""
+        own = self._sumo.lane
+        return [
+            (link[0], own.getEdgeID(link[0]))
+            for link in own.getLinks(lane)
+            if all(self._admits_now(part, kind) for part in (link[4], link[0]) if part)
+        ]
+
+    def _admits_now(self, lane: str, kind: str) -> bool:
+        # SUMO lists none as allowed where all are, and where none is.
+        allowed = self._sumo.lane.getAllowed(lane)
+        return kind in allowed if allowed else kind not in self._sumo.lane.getDisallowed(lane)
+
     def lengths(self) -> dict[str, dict[str, float]]:
         """Lanes that vehicles may use, by edge, and their lengths in metres; junctions as well."""
         lane = self._sumo.lane

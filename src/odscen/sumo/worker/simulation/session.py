@@ -50,6 +50,10 @@ _HAPPENINGS = (
 """Getters of numbers and lists, as in :class:`StepLists`."""
 
 
+_BESIDE_END = 5.0
+"""Metres before the end of an edge where a vehicle waits beside the road."""
+
+
 class Session:
     """A running simulation. Made by :func:`open_session` only."""
 
@@ -195,6 +199,34 @@ class Session:
         """Edges of the stops that a vehicle has before it, in their order."""
         lane = self._sumo.lane.getEdgeID
         return tuple(lane(stop.lane) for stop in self._sumo.vehicle.getStops(vehicle))
+
+    def park_until(self, vehicle: str, edge: str, until: float) -> bool:
+        """Let a vehicle wait beside the end of an edge; false if SUMO refuses it.
+
+        Parameters
+        ----------
+        until
+            Simulated seconds.
+        """
+        api, lane = self._sumo.vehicle, self._sumo.lane
+        if any(
+            lane.getEdgeID(stop.lane) == edge and stop.until == until
+            for stop in api.getStops(vehicle)
+        ):
+            return True
+        kind = api.getVehicleClass(vehicle)
+        lanes = enumerate(self.lanes.in_order(edge))
+        index, own = next((pair for pair in lanes if self.lanes.admits(pair[1], kind)), (0, ""))
+        if not own:
+            return False
+        place = max(lane.getLength(own) - _BESIDE_END, 1.0)
+        parking = 1
+        try:
+            # Without a duration SUMO would hold it for ever, whatever ``until`` says.
+            api.setStop(vehicle, edge, place, index, 0.0, parking, 0.0, until)
+        except self._errors:
+            return False
+        return True
 
     def set_route(self, vehicle: str, edges: Sequence[str]) -> bool:
         """Give a vehicle another route from its edge on; false if SUMO refuses it."""

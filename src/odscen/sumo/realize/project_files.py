@@ -1,0 +1,389 @@
+"""Files of a SUMO project in a run: what SUMO reads, and what is planned of their road users.
+
+The files run as they are. What could write or read elsewhere on the disk is taken out of them, as a
+scenario may come from anywhere: outputs keep the bare name of their file, and options are of the
+kinds in :data:`OPTIONS`. Source:
+sumo.dlr.de/docs/Definition_of_Vehicles,_Vehicle_Types,_and_Routes.html.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import PurePosixPath
+from typing import TYPE_CHECKING, Final
+
+from lxml import etree
+
+from odscen.base.categories import DEFAULT_BODY, Body, Category
+from odscen.base.errors import InputError, in_file
+from odscen.base.xml_reading import read_xml
+from odscen.lanegraph.query import node_id
+from odscen.records.run_plan import PlannedActor
+from odscen.runs import layout
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from odscen.scenario.document.sumo_document import SumoFile, SumoProject
+    from odscen.sumo.realize.sumo_map import SumoMap
+
+OPTIONS: Final = re.compile(
+    r"default\.(speeddev|action-step-length|carfollowmodel|emergencydecel)"
+    r"|step-method\.ballistic|extrapolate-departpos|threads|scale(-suffix)?"
+    r"|random(-depart-offset)?|thread-rngs"
+    r"|time-to-teleport\.[a-z.-]+|time-to-impatience|waiting-time-memory|max-depart-delay"
+    r"|max-num-(vehicles|persons|teleports)|sloppy-insert|eager-insert|insertion-checks|route-steps"
+    r"|ignore-(route-errors|accidents|junction-blocker)|collision\.[a-z-]+"
+    r"|intermodal-collision\.[a-z-]+|emergencydecel\.[a-z-]+|parking\.maneuver|use-stop-(ended|started)"
+    r"|lanechange\.[a-z.-]+|overhead-wire\.[a-z-]+|tls\.[a-z.-]+|railsignal[a-z.-]*"
+    r"|pedestrian\.(striping\.[a-z.-]+|jupedsim\.[a-z.-]+|remote\.[a-z-]+)"
+    r"|persontrip\.[a-z.-]+|ride\.stop-tolerance|mapmatch\.[a-z-]+"
+    r"|routing-algorithm|weights\.(random-factor|priority-factor|turnaround-penalty|minor-penalty"
+    r"|tls-penalty|separate-turns)|astar\.landmark-distance|routing-threads"
+    r"|device\.(rerouting|emissions|battery|elechybrid|taxi|glosa|tripinfo|vehroute|bluelight|toc"
+    r"|driverstate|stationfinder|friction|fcd|example|btreceiver|btsender|person-device)\."
+    r"(?!.*(file|output))[a-z0-9._-]+"
+    r"|person-device\.(?!.*(file|output))[a-z0-9._-]+"
+)
+"""Options of SUMO that change what happens and name no file."""
+
+_WRITES: Final = frozenset(("file", "output", "dest", "outfile", "imgFile", "trajectory-output"))
+"""Attributes that name a file to be written, or a picture."""
+_RESERVED: Final = frozenset(
+    value for name, value in vars(layout).items() if name.endswith("_FILE")
+)
+"""Names of files of a run."""
+_CLASSES: Final[dict[str, Category]] = {
+    "passenger": Category.CAR, "private": Category.CAR, "taxi": Category.CAR, "hov": Category.CAR,
+    "evehicle": Category.CAR, "ignoring": Category.CAR, "vip": Category.CAR,
+    "authority": Category.CAR, "army": Category.TRUCK, "custom1": Category.CAR,
+    "custom2": Category.CAR, "emergency": Category.VAN, "delivery": Category.VAN,
+    "truck": Category.TRUCK, "trailer": Category.TRUCK, "bus": Category.BUS, "coach": Category.BUS,
+    "tram": Category.BUS, "rail": Category.BUS, "rail_urban": Category.BUS,
+    "rail_electric": Category.BUS, "rail_fast": Category.BUS, "subway": Category.BUS,
+    "cable_car": Category.BUS, "motorcycle": Category.MOTORCYCLE, "moped": Category.MOTORCYCLE,
+    "bicycle": Category.BICYCLE, "scooter": Category.BICYCLE, "pedestrian": Category.PEDESTRIAN,
+    "wheelchair": Category.PEDESTRIAN,
+}  # fmt: skip
+"""Category that figures have vehicles of a class in; odscen has no rails, which are with buses."""
+_LENGTHS: Final = {
+    "coach": 14.0, "trailer": 16.5, "moped": 2.1, "tram": 22.0, "rail": 67.5, "rail_urban": 109.5,
+    "rail_electric": 200.0, "rail_fast": 200.0, "subway": 109.5, "emergency": 6.5, "scooter": 1.2,
+}  # fmt: skip
+MOST_LISTED = 500_000
+"""Road users of a project in the plan."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectFiles:
+    """What a run has of a project.
+
+    Attributes
+    ----------
+    routes, additional
+        Names of files in the order in which SUMO reads them.
+    texts
+        By name.
+    actors
+        Road users that are known before the run, in order of departure.
+    notes
+        What the plan does not know of.
+    """
+
+    routes: tuple[str, ...]
+    additional: tuple[str, ...]
+    texts: dict[str, str]
+    actors: tuple[PlannedActor, ...]
+    notes: tuple[str, ...]
+
+
+def project_files(
+    project: SumoProject, sumo_map: SumoMap, *, until: float, taken: Iterable[str]
+) -> ProjectFiles:
+    """Files of a project for a run.
+
+    Parameters
+    ----------
+    until
+        End of the run, s: who departs later is not planned.
+    taken
+        Names of files that the run has already.
+
+    Raises
+    ------
+    InputError
+        If a file is damaged, or no XML.
+    """
+    names = _free_names(project.files, set(taken))
+    texts: dict[str, str] = {}
+    reader = _UserReader(sumo_map, until)
+    roots = []
+    for file, name in zip(project.files, names, strict=True):
+        with in_file(file.name):
+            text = file.text
+            root = read_xml(text, huge=True)
+            texts[name] = _made_harmless(root, text)
+            roots.append((file.name, root))
+    # Additional files come first in SUMO, so types and routes of any file are known to all.
+    for _, root in roots:
+        reader.read_types(root)
+    for name, root in roots:
+        with in_file(name):
+            reader.read_users(root)
+    return ProjectFiles(
+        tuple(n for n, f in zip(names, project.files, strict=True) if f.kind == "routes"),
+        tuple(n for n, f in zip(names, project.files, strict=True) if f.kind == "additional"),
+        texts,
+        reader.actors(),
+        tuple(reader.notes),
+    )
+
+
+def allowed_options(options: Mapping[str, str]) -> dict[str, str]:
+    """Options of a project that are handed on to SUMO."""
+    return {name: value for name, value in options.items() if OPTIONS.fullmatch(name)}
+
+
+def _free_names(files: Sequence[SumoFile], taken: set[str]) -> list[str]:
+    names = []
+    for file in files:
+        name = file.name
+        while name in taken:
+            name = f"project.{name}"
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+def _made_harmless(root: etree._Element, text: str) -> str:
+    """The text, unless it names files elsewhere: these are then beside it."""
+    changed = False
+    for element in root.iter():
+        if not isinstance(element.tag, str):
+            continue
+        if element.tag == "include":
+            raise InputError(
+                "<include> is not possible here; put its content in", element="include"
+            )
+        for name in _WRITES.intersection(element.attrib):
+            value = str(element.get(name))
+            bare = PurePosixPath(value.replace("\\", "/")).name.replace(":", "_")
+            if bare in ("stdout", "stderr", "-", "/dev/null", ""):
+                bare = "NUL"
+            if bare in _RESERVED:
+                bare = f"project.{bare}"
+            if bare != value:
+                element.set(name, bare)
+                changed = True
+    if not changed:
+        return text
+    return etree.tostring(root, encoding="unicode") + "\n"
+
+
+@dataclass(frozen=True, slots=True)
+class _Type:
+    category: Category
+    body: Body
+    speed: float = math.inf
+
+
+_CAR = _Type(Category.CAR, DEFAULT_BODY[Category.CAR])
+
+
+class _UserReader:
+    """Reads vehicles, trips, flows and persons, as far as they are known before SUMO runs."""
+
+    def __init__(self, sumo_map: SumoMap, until: float) -> None:
+        self.notes: list[str] = []
+        self._map = sumo_map
+        self._until = until
+        self._types: dict[str, _Type] = {"DEFAULT_VEHTYPE": _CAR}
+        self._routes: dict[str, tuple[str, ...]] = {}
+        self._actors: list[PlannedActor] = []
+        self._seen: set[str] = set()
+        self._unlisted = 0
+        walker = Category.PEDESTRIAN
+        self._types["DEFAULT_PEDTYPE"] = _Type(walker, DEFAULT_BODY[walker])
+
+    def actors(self) -> tuple[PlannedActor, ...]:
+        """Who was found, in order of departure."""
+        return tuple(sorted(self._actors, key=lambda actor: (actor.depart, actor.id)))
+
+    def read_types(self, root: etree._Element) -> None:
+        """Read types, distributions of them, and routes by name."""
+        for element in root.iter("vType"):
+            self._types[element.get("id", "")] = _read_type(element)
+        for element in root.iter("vTypeDistribution"):
+            members = [self._types[m.get("id", "")] for m in element.iter("vType")]
+            members += [self._types[n] for n in _words(element, "vTypes") if n in self._types]
+            if members:
+                self._types[element.get("id", "")] = members[0]
+        for element in root.iter("route"):
+            if element.get("id"):
+                self._routes[str(element.get("id"))] = tuple(_words(element, "edges"))
+        for element in root.iter("routeDistribution"):
+            inner = [tuple(_words(route, "edges")) for route in element.iter("route")]
+            inner += [self._routes[n] for n in _words(element, "routes") if n in self._routes]
+            if inner and element.get("id"):
+                self._routes[str(element.get("id"))] = inner[0]
+
+    def read_users(self, root: etree._Element) -> None:
+        """Read who is on the road."""
+        for element in root.iterchildren("vehicle", "trip", "flow", "person", "personFlow"):
+            if len(self._actors) >= MOST_LISTED:
+                self.notes.append(f"only the first {MOST_LISTED} road users are in the plan")
+                return
+            name = element.get("id", "")
+            edges = self._edges_of(element)
+            kind = self._types.get(element.get("type", ""), _CAR)
+            if element.tag in ("person", "personFlow"):
+                kind = self._types.get(element.get("type", ""), self._types["DEFAULT_PEDTYPE"])
+            if element.tag in ("flow", "personFlow"):
+                self._add_flow(element, name, edges, kind)
+                continue
+            depart = seconds_of(element.get("depart"))
+            if depart is None:
+                depart = self._until  # triggered by another: not due at any known time
+            self._add(name, depart, edges, kind, flow=None, appears=element.get("depart"))
+
+    def _edges_of(self, element: etree._Element) -> tuple[str, ...]:
+        """Edges of a route, or of a trip those that it names."""
+        if element.get("route"):
+            return self._routes.get(str(element.get("route")), ())
+        inner = element.find("route")
+        if inner is None and element.find("routeDistribution") is not None:
+            inner = element.find("routeDistribution/route")
+        if inner is not None:
+            return tuple(_words(inner, "edges"))
+        if element.tag in ("person", "personFlow"):
+            stage = next(iter(element.iterchildren("walk", "ride", "personTrip")), None)
+            if stage is None:
+                return ()
+            if stage.get("route"):
+                return self._routes.get(str(stage.get("route")), ())
+            edges = _words(stage, "edges") or [*_words(stage, "from"), *_words(stage, "to")]
+            return tuple(edges)
+        return (*_words(element, "from"), *_words(element, "via"), *_words(element, "to"))
+
+    def _add_flow(
+        self, element: etree._Element, name: str, edges: tuple[str, ...], kind: _Type
+    ) -> None:
+        begin = seconds_of(element.get("begin")) or 0.0
+        end = seconds_of(element.get("end"))
+        last = min(self._until, math.inf if end is None else end)
+        number = _number(element.get("number"))
+        period = _number(element.get("period"))
+        hourly = next(
+            (v for k in ("vehsPerHour", "perHour") if (v := _number(element.get(k)))), None
+        )
+        if hourly:
+            period = 3600.0 / hourly
+        if period is None and number and end is not None:
+            period = (end - begin) / number
+        if not period or period <= 0.0:
+            self.notes.append(
+                f"flow {name} is drawn by SUMO: its road users are in the run, and in figures by "
+                "place, but not in the list of road users"
+            )
+            return
+        for index in range(MOST_LISTED):
+            depart = begin + index * period
+            if depart >= last - 1e-9 or (number is not None and index >= number):
+                break
+            self._add(f"{name}.{index}", depart, edges, kind, flow=name)
+
+    def _add(
+        self,
+        name: str,
+        depart: float,
+        edges: tuple[str, ...],
+        kind: _Type,
+        *,
+        flow: str | None,
+        appears: str | None = None,
+    ) -> None:
+        if depart > self._until or name in self._seen:
+            return
+        self._seen.add(name)
+        triggered = appears is not None and seconds_of(appears) is None
+        start, end = self._place(edges), self._place(tuple(reversed(edges)), last=True)
+        lanes = self._map.graph.lanes
+        net = self._map.net
+        whole = bool(edges) and all(edge in net.edge_lanes for edge in edges)
+        whole = whole and all(
+            net.ends[before][1] == net.ends[after][0] for before, after in pairwise(edges)
+        )
+        lengths = [net.edge_lanes[edge][0] for edge in edges] if whole else []
+        self._actors.append(
+            PlannedActor(
+                id=name,
+                category=kind.category.value,
+                spawn=edges[0] if start is None and edges else self._node_name(start),
+                goal=(edges[-1] if edges else None) if end is None else self._node_name(end),
+                depart=round(depart, 3),
+                length=kind.body.length,
+                width=kind.body.width,
+                x=0.0 if start is None else round(float(lanes.x[start]), 3),
+                y=0.0 if start is None else round(float(lanes.y[start]), 3),
+                z=0.0 if start is None else round(float(lanes.z[start]), 3),
+                hdg=0.0 if start is None else round(float(lanes.hdg[start]), 6),
+                route_length=round(sum(lane.length for lane in lengths), 2) if whole else None,
+                free_flow_time=round(
+                    sum(lane.length / max(min(lane.speed, kind.speed), 0.1) for lane in lengths), 2
+                )
+                if whole
+                else None,
+                flow=flow,
+                appears=triggered,
+                from_file=True,
+            )
+        )
+
+    def _place(self, edges: tuple[str, ...], *, last: bool = False) -> int | None:
+        """Node at the begin of the first edge that the map has, or at its end."""
+        for edge in edges:
+            ends = self._map.edge_ends.get(edge)
+            if ends is not None:
+                return ends[1] if last else ends[0]
+        return None
+
+    def _node_name(self, node: int | None) -> str:
+        return "" if node is None else str(node_id(self._map.graph, node))
+
+
+def _read_type(element: etree._Element) -> _Type:
+    vclass = element.get("vClass", "passenger")
+    category = _CLASSES.get(vclass, Category.CAR)
+    usual = DEFAULT_BODY[category]
+    length = _number(element.get("length")) or _LENGTHS.get(vclass, usual.length)
+    width = _number(element.get("width")) or usual.width
+    speed = _number(element.get("maxSpeed")) or math.inf
+    return _Type(category, Body(length, width, usual.height), speed)
+
+
+def _words(element: etree._Element, name: str) -> list[str]:
+    return (element.get(name) or "").split()
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        value = float(text or "")
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def seconds_of(text: str | None) -> float | None:
+    """Seconds of a time of SUMO, also as ``h:m:s`` or ``d:h:m:s``; ``None`` of words."""
+    if text and ":" in text:
+        parts = text.split(":")
+        try:
+            values = [float(part) for part in parts]
+        except ValueError:
+            return None
+        scale = (86_400.0, 3600.0, 60.0, 1.0)[-len(values) :]
+        return sum(v * s for v, s in zip(values, scale, strict=True)) if len(values) <= 4 else None
+    return _number(text)

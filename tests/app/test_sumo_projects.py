@@ -1,0 +1,294 @@
+"""SUMO projects: opened whole, run as ``sumo -c`` runs them, and written as they were."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import sumo
+from lxml import etree
+
+from odscen.app.exchange.exports import export
+from odscen.app.exchange.imports import ImportedFile, import_file
+from odscen.app.maps import load_map
+from odscen.app.running.runs import run
+from odscen.base.errors import InputError, OdscenError
+from odscen.base.xml_reading import read_xml
+from odscen.maps.store import Workspace
+from odscen.runs.finished_run import Run
+from odscen.scenario import edits
+from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.document.measures_document import RoadClosure
+from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.document.sumo_document import SumoFile
+from odscen.sumo.realize.project_files import _made_harmless, allowed_options
+
+BIN = Path(sumo.SUMO_HOME) / "bin"
+PROJECTS = Path(
+    os.environ.get("ODSCEN_TEST_PROJECTS", Path(__file__).parents[3] / "shared" / "projects")
+)
+CONFIG = """<sumoConfiguration><input><net-file value="grid.net.xml"/>
+<route-files value="sub/cars.rou.xml,people.rou.xml"/><additional value="things.add.xml"/></input>
+<output><summary-output value="/tmp/summary.xml"/></output>
+<time><begin value="100"/><end value="1200"/></time>
+<processing><time-to-teleport value="150"/><max-depart-delay value="600"/></processing>
+<gui_only><gui-settings-file value="missing.xml"/></gui_only></sumoConfiguration>"""
+CARS = """<routes><vType id="slow" maxSpeed="8" length="7.5" vClass="truck"/>
+<vType id="b" sigma="0.2"/><vTypeDistribution id="mix" vTypes="a b" probabilities="0.5 0.5"/>
+<route id="r" edges="A0B0 B0C0"/>
+<vehicle id="v1" type="slow" route="r" depart="100"/>
+<vehicle id="v2" type="mix" depart="0:01:50"><route edges="A1B1 B1C1"/>
+ <stop busStop="bs" duration="10"/></vehicle>
+<trip id="t1" type="mix" depart="112" from="A0A1" to="C1C2"/>
+<flow id="f" type="mix" begin="120" end="1020" period="9" from="A2B2" to="C0C1"/>
+<flow id="g" begin="120" end="1020" probability="0.05" from="C2B2" to="A1A0"/>
+</routes>"""
+PEOPLE = """<routes><person id="p1" depart="105"><walk edges="A0B0 B0C0"/></person>
+<person id="p2" depart="106">
+<walk from="A1B1" busStop="bs"/><ride busStop="bs2" lines="L"/></person>
+<vehicle id="bus" line="L" depart="130"><route edges="A1B1 B1C1"/>
+<stop busStop="bs" duration="20"/><stop busStop="bs2" duration="20"/></vehicle>
+<vType id="w" vClass="pedestrian"/></routes>"""
+THINGS = """<additional><vType id="a"/>
+<busStop id="bs" lane="A1B1_1" startPos="50" endPos="70"/>
+<busStop id="bs2" lane="B1C1_1" startPos="50" endPos="70"/>
+<parkingArea id="pa" lane="B0C0_1" startPos="20" endPos="60" roadsideCapacity="3"/>
+<inductionLoop id="loop 1" lane="A2B2_1" pos="-20" period="300" file="../../loops.xml"/>
+<laneAreaDetector id="e2" lane="A2B2_1" pos="10" endPos="50" period="300" file="e2.xml"/>
+<taz id="west" edges="A0B0 A1B1"/>
+<variableSpeedSign id="vss" lanes="A2B2_1"><step time="0" speed="9"/></variableSpeedSign>
+<rerouter id="re" edges="A0A1"><interval begin="0" end="1e5"><closingReroute id="B2C2"/></interval>
+</rerouter>
+<calibrator id="cal" edge="B2B1" pos="0" output="cal.xml"><flow begin="100" end="900" route="cr"
+ vehsPerHour="400" speed="12" type="a"/></calibrator>
+<route id="cr" edges="B2B1 B1B0"/>
+<tlLogic id="B1" type="static" programID="day" offset="7">PHASES</tlLogic>
+<tlLogic id="B1" type="static" programID="night" offset="0">PHASES</tlLogic>
+<tlLogic id="nowhere" type="static" programID="x" offset="0">
+<phase duration="5" state="G"/></tlLogic>
+<WAUT id="w" refTime="0" startProg="day"><wautSwitch time="700" to="night"/></WAUT>
+<wautJunction wautID="w" junctionID="B1"/>
+</additional>"""
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A grid with lights and sidewalks, far from the origin."""
+    folder = tmp_path_factory.mktemp("project")
+    (folder / "sub").mkdir()
+    command = [
+        BIN / "netgenerate", "--grid", "--grid.number", "3", "--grid.length", "150", "-L", "1",
+        "--sidewalks.guess", "--crossings.guess", "--default-junction-type", "traffic_light",
+        "--offset.x", "5000", "--offset.y", "-300", "-o", "grid.net.xml",
+    ]  # fmt: skip
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    net = etree.parse(folder / "grid.net.xml")
+    logic = next(x for x in net.iter("tlLogic") if x.get("id") == "B1")
+    phases = "".join(etree.tostring(p, encoding="unicode") for p in logic.iter("phase"))
+    (folder / "run.sumocfg").write_text(CONFIG)
+    (folder / "sub" / "cars.rou.xml").write_text(CARS)
+    (folder / "people.rou.xml").write_text(PEOPLE)
+    (folder / "things.add.xml").write_text(THINGS.replace("PHASES", phases))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    return Workspace.open(tmp_path_factory.mktemp("store"))
+
+
+@pytest.fixture(scope="module")
+def imported(store: Workspace, project: Path) -> ImportedFile:
+    return import_file(store, project / "run.sumocfg")
+
+
+@pytest.fixture(scope="module")
+def scenario(imported: ImportedFile) -> Scenario:
+    assert imported.scenario is not None
+    return imported.scenario
+
+
+def test_a_project_opens_with_a_map_that_has_its_network(
+    store: Workspace, project: Path, scenario: Scenario
+) -> None:
+    entry = store.map("grid")
+    assert scenario.map.sha256 == entry.sha256
+    edges = {edge for edge in entry.lane_table().edges if not edge.startswith(":")}
+    net = etree.parse(project / "grid.net.xml").getroot()
+    assert edges == {e.get("id") for e in net.iter("edge") if e.get("function") is None}
+    assert entry.lane_table().intervals
+
+
+def test_what_is_taken_and_what_runs_on_is_listed(imported: ImportedFile) -> None:
+    taken = {row.xpath: row.reason for row in imported.lists["taken"]}
+    assert "runs on as SUMO's own file" in taken["things.add.xml: 1 x calibrator"]
+    assert taken["inductionLoop loop 1"] == "detector loop-1 of the study"
+    assert taken["taz west"] == "zone west"
+    assert taken["tlLogic B1, program day"].endswith("the program in force of the map's network")
+    assert taken["option max-depart-delay"] == "600, handed on to SUMO"
+    ignored = {row.xpath: row.reason for row in imported.lists["ignored"]}
+    assert set(ignored) == {
+        "tlLogic nowhere", "option summary-output", "option gui-settings-file",
+    }  # fmt: skip
+
+
+def test_the_document_has_times_seed_and_parts(scenario: Scenario) -> None:
+    assert (scenario.simulation.duration, scenario.simulation.step_length) == (1200.0, 1.0)
+    assert scenario.simulation.teleport_after == 150.0
+    assert scenario.study.warm_up == 100.0
+    assert scenario.seed == 23423
+    assert scenario.sumo is not None
+    assert scenario.sumo.begin == 100.0
+    assert [file.name for file in scenario.sumo.files] == [
+        "things.add.xml", "cars.rou.xml", "people.rou.xml",
+    ]  # fmt: skip
+    assert loads(dumps(scenario)) == scenario
+
+
+def trips_of(file: Path) -> dict[str, tuple[float, float]]:
+    return {
+        str(t.get("id")): (float(t.get("depart", "")), float(t.get("duration", "")))
+        for t in etree.parse(file).iter("tripinfo")
+        if float(t.get("arrival", "-1")) >= 0
+    }
+
+
+@pytest.fixture(scope="module")
+def original(project: Path) -> dict[str, tuple[float, float]]:
+    text = CONFIG.replace("missing.xml", "").replace("/tmp/summary.xml", "summary.xml")
+    text = text.replace('<gui_only><gui-settings-file value=""/></gui_only>', "")
+    (project / "plain.sumocfg").write_text(text)
+    things = (project / "things.add.xml").read_text().replace("../../", "")
+    start, _, rest = things.partition('<tlLogic id="nowhere"')
+    (project / "plain.add.xml").write_text(start + rest.partition("</tlLogic>")[2])
+    subprocess.run(
+        [
+            BIN / "sumo", "-c", "plain.sumocfg", "-a", "plain.add.xml", "--tripinfo-output",
+            "trips.xml", "--precision", "4",
+        ],
+        cwd=project, check=True, capture_output=True,
+    )  # fmt: skip
+    return trips_of(project / "trips.xml")
+
+
+@pytest.fixture(scope="module")
+def finished(store: Workspace, scenario: Scenario) -> Run:
+    return run(store, scenario)
+
+
+def test_the_run_is_that_of_sumo_alone(
+    finished: Run, original: dict[str, tuple[float, float]]
+) -> None:
+    rows = {row["id"]: row for row in finished.actors().to_dicts()}
+    arrived = {
+        event["actor"]: event["travel_time"]
+        for event in finished.events().to_dicts()
+        if event["kind"] == "arrived"
+        and rows.get(event["actor"], {}).get("category") != "pedestrian"
+    }
+    assert arrived.keys() == original.keys()
+    mine = sum(arrived.values()) / len(arrived)
+    assert mine == pytest.approx(sum(t for _, t in original.values()) / len(original), rel=0.05)
+    assert (rows["v1"]["category"], rows["v1"]["status"]) == ("truck", "arrived")
+    assert Counter(row["flow"] for row in rows.values())["f"] == 100
+    assert {"p1", "p2", "bus", "t1"} <= rows.keys()
+
+
+def test_nothing_is_written_outside_the_run(finished: Run) -> None:
+    assert (finished.folder / "loops.xml").is_file()
+    assert not Path("/tmp/summary.xml").exists()
+
+
+def test_exported_files_are_those_that_came(
+    store: Workspace, scenario: Scenario, tmp_path: Path
+) -> None:
+    export(store, scenario, tmp_path, to="sumo")
+    assert (tmp_path / "cars.rou.xml").read_text() == CARS
+    assert (tmp_path / "people.rou.xml").read_text() == PEOPLE
+    done = subprocess.run(
+        [BIN / "sumo", "-c", "scenario.sumocfg"],
+        check=False,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_closure_of_the_scenario_leads_vehicles_of_the_project_around(
+    store: Workspace, scenario: Scenario
+) -> None:
+    sumo_map = load_map(store.map("grid")).sumo
+    graph = sumo_map.graph
+    node = sumo_map.edge_ends["B0C0"][1]
+    closed = str(graph.segments.ids[int(graph.lanes.segment[node])])
+    measure = RoadClosure(id="closed", kind="closure", places=(closed,), begin=0.0, end=1200.0)
+    done = run(store, edits.set_measure(scenario, graph, measure=measure))
+    rows = {row["id"]: row for row in done.actors().to_dicts()}
+    assert rows["v1"]["status"] == "stranded"  # its goal is behind the closure
+    assert rows["v2"]["status"] == "arrived"
+
+
+def test_the_network_alone_is_a_map_and_an_empty_scenario(store: Workspace, project: Path) -> None:
+    made = import_file(store, project / "grid.net.xml")
+    assert made.scenario is not None
+    assert made.scenario.sumo is None
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ({"x.sumocfg": "<routes/>"}, "open the .sumocfg that names this file"),
+        ({"x.sumocfg": "<duarouterConfiguration/>"}, "another program of SUMO"),
+        ({"x.sumocfg": "<configuration><input/></configuration>"}, "names no net-file"),
+        (
+            {"x.sumocfg": "<configuration><net-file value='n.net.xml'/></configuration>"},
+            "n.net.xml",
+        ),
+        ({"x.sumocfg": "<configuration"}, "not well-formed"),
+        (
+            {
+                "x.sumocfg": "<configuration><net-file value='n.net.xml'/><route-files "
+                "value='r.xml'/></configuration>",
+                "r.xml": "<routes><vehicle></routes>",
+            },
+            r"r\.xml.*not well-formed",
+        ),
+        (
+            {
+                "x.sumocfg": "<configuration><net-file value='n.net.xml'/></configuration>",
+                "n.net.xml": "<nodes/>",
+            },
+            "netconvert|SUMO network",
+        ),
+        (
+            {
+                "x.sumocfg": "<configuration><net-file value='n.net.xml'/><a value='a.xml'/>"
+                "</configuration>",
+                "a.xml": "<additional><include href='a.xml'/></additional>",
+            },
+            "include each other without an end",
+        ),
+    ],
+)
+def test_wrong_projects_are_refused_with_file_and_reason(
+    store: Workspace, tmp_path: Path, files: dict[str, str], words: str
+) -> None:
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    with pytest.raises(OdscenError, match=words):
+        import_file(store, tmp_path / "x.sumocfg")
+
+
+def test_a_document_cannot_make_sumo_write_elsewhere() -> None:
+    text = '<additional><edgeData id="x" file="/etc/passwd"/><a output="host:99"/></additional>'
+    harmless = read_xml(_made_harmless(read_xml(text), text))
+    assert [e.get("file", e.get("output")) for e in harmless] == ["passwd", "host_99"]
+    assert allowed_options({"fcd-output": "x", "device.emissions.probability": "1"}) == {
+        "device.emissions.probability": "1"
+    }
+    with pytest.raises(InputError, match="cannot be unpacked"):
+        _ = SumoFile(name="a.xml", kind="routes", packed="aGVsbG8=").text
