@@ -36,6 +36,7 @@ const background: Background = {
   begin: 0,
   end: null,
   profile: null,
+  arrivals: "even" as const,
   mix: { car: 8, van: 1, bus: 1 },
   fill: null,
   per_km: 5,
@@ -65,6 +66,7 @@ test("traffic is summed up in a line, and zones or profiles alone bring no road 
     begin: 0,
     end: null,
     profile: null,
+    arrivals: "even" as const,
     mix: { car: 1 },
     trips: [
       ["a", "b", 900.4],

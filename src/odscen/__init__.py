@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from odscen.app.scenarios import check_scenario as check
     from odscen.app.scenarios import generate, read_scenario, write_scenario
     from odscen.app.signals.green_waves import coordinate_signals
+    from odscen.app.signals.signal_evaluation import evaluate_signals
     from odscen.app.signals.signal_optimisation import time_signals
     from odscen.app.signals.signal_plans import export_signals, import_signals, signal_programs
     from odscen.app.template_scenarios import template_scenario as place_template
@@ -112,6 +113,7 @@ _HOMES = {
     "signal_programs": "odscen.app.signals.signal_plans",
     "import_signals": "odscen.app.signals.signal_plans",
     "export_signals": "odscen.app.signals.signal_plans",
+    "evaluate_signals": "odscen.app.signals.signal_evaluation",
     "time_signals": "odscen.app.signals.signal_optimisation",
     "coordinate_signals": "odscen.app.signals.green_waves",
     "scenario_arrays": "odscen.app.learner_arrays",
@@ -202,6 +204,7 @@ __all__ = [
     "compare",
     "coordinate_signals",
     "correct_matrix",
+    "evaluate_signals",
     "experiment_results",
     "export",
     "export_signals",

@@ -13,6 +13,7 @@ from lxml import etree
 
 from odscen.app.exchange.exports import export
 from odscen.app.exchange.imports import ImportedFile, import_file
+from odscen.app.exchange.sent_files import SentFile, read_sent_scenario
 from odscen.app.maps import load_map
 from odscen.app.running.runs import run
 from odscen.base.errors import InputError, OdscenError
@@ -130,6 +131,7 @@ def test_what_is_taken_and_what_runs_on_is_listed(imported: ImportedFile) -> Non
     assert taken["tlLogic B1, program day"].endswith("the program in force of the map's network")
     assert taken["option max-depart-delay"] == "600, handed on to SUMO"
     ignored = {row.xpath: row.reason for row in imported.lists["ignored"]}
+    assert imported.problems == ()
     assert set(ignored) == {
         "tlLogic nowhere", "option summary-output", "option gui-settings-file",
     }  # fmt: skip
@@ -236,6 +238,44 @@ def test_the_network_alone_is_a_map_and_an_empty_scenario(store: Workspace, proj
     made = import_file(store, project / "grid.net.xml")
     assert made.scenario is not None
     assert made.scenario.sumo is None
+
+
+def test_of_a_network_in_pieces_the_largest_is_the_region(tmp_path: Path) -> None:
+    (tmp_path / "n.nod.xml").write_text(
+        '<nodes><node id="a" x="0" y="0"/><node id="b" x="300" y="0"/><node id="c" x="0" y="90"/>'
+        '<node id="d" x="40" y="90"/></nodes>'
+    )
+    (tmp_path / "n.edg.xml").write_text(
+        '<edges><edge id="long" from="a" to="b"/><edge id="short" from="c" to="d"/></edges>'
+    )
+    command = [BIN / "netconvert", "-n", "n.nod.xml", "-e", "n.edg.xml", "-o", "n.net.xml"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    made = import_file(Workspace.open(tmp_path / "store"), tmp_path / "n.net.xml")
+    assert made.scenario is not None
+    assert [problem.code for problem in made.problems] == ["no_actors"]
+    assert len(made.scenario.roi) == 3
+    assert "1 of 4 segments are not connected" in made.lists["approximated"][0].reason
+
+
+def test_files_that_are_sent_together_are_a_project(project: Path, tmp_path: Path) -> None:
+    store = Workspace.open(tmp_path)
+    names = ["run.sumocfg", "grid.net.xml", "sub/cars.rou.xml", "people.rou.xml", "things.add.xml"]
+    sent = [SentFile(Path(name).name, (project / name).read_bytes()) for name in names]
+    read = read_sent_scenario(store, sent, of="sumo", progress=lambda *_: None)
+    assert read.added
+    assert read.scenario.map.name == "grid"
+    assert read.scenario.sumo is not None
+    assert len(read.scenario.sumo.files) == 3
+    again = read_sent_scenario(store, sent, of="sumo", progress=lambda *_: None)
+    assert not again.added
+    assert again.scenario == read.scenario
+    with pytest.raises(InputError, match=r"needs the file 'people\.rou\.xml'"):
+        read_sent_scenario(
+            store,
+            [file for file in sent if file.name != "people.rou.xml"],
+            of="sumo",
+            progress=lambda *_: None,
+        )
 
 
 @pytest.mark.parametrize(

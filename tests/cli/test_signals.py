@@ -55,7 +55,10 @@ def placed(space: Path, one: Scenario, name: str, file: Path) -> Path:
 def test_lights_are_timed_after_the_demand(workspace: Path, tmp_path: Path) -> None:
     file = placed(workspace, scenario(None), "signal_crossing", tmp_path / "one.scenario.json")
     out = tmp_path / "timed.scenario.json"
-    told = odscen("signals", "webster", file, "-o", out, "--workspace", workspace, "--json").json
+    timing = ("signals", "webster", file, "-o", out, "--workspace", workspace)
+    told = odscen(*timing, "--seeds", "1,2", "--json").json
+    assert told["evaluation"]["seeds"] == [1, 2]
+    assert told["evaluation"]["verdict"] in ("better", "unclear")
     (light,) = told["lights"]
     assert told["scenario"] == str(out)
     assert light["junctions"] == ["10001"]
@@ -64,17 +67,29 @@ def test_lights_are_timed_after_the_demand(workspace: Path, tmp_path: Path) -> N
     seconds = [one["seconds"] if isinstance(one, dict) else one[0]
                for one in shown["lights"][0]["plans"][0]["phases"]]  # fmt: skip
     assert sum(seconds) == light["cycle"]
-    table = odscen("signals", "webster", file, "-o", out, "--workspace", workspace).out
+    table = odscen(*timing, "--no-trial").out
     assert "flow ratio" in table
     assert "v/c" in table
     few = odscen(
-        "signals", "webster", file, "--turn-arrows", "-o", out, "--workspace", workspace, "--json"
+        "signals",
+        "webster",
+        file,
+        "--no-trial",
+        "--turn-arrows",
+        "-o",
+        out,
+        "--workspace",
+        workspace,
+        "--json",
     )
     assert few.json["arrows"] == []
     busy = placed(
         workspace, scenario(None, vehicles=900.0), "signal_crossing", tmp_path / "two.scenario.json"
     )
-    told = odscen("signals", "webster", busy, "--turn-arrows", "-o", out, "--workspace", workspace)
+    told = odscen(
+        "signals", "webster", busy, "--no-trial", "--turn-arrows", "-o", out,
+        "--workspace", workspace,
+    )  # fmt: skip
     assert "the left turn from r1 has got an arrow" in told.err
     wrong = odscen("signals", "webster", file, "--end", 9000, "--workspace", workspace, "--json")
     assert wrong.code != 0
@@ -113,3 +128,26 @@ def test_programs_are_drawn_into_a_file_or_a_folder(workspace: Path, tmp_path: P
     assert wrong.code != 0
     assert "10001" in wrong.json["error"]["message"]
     assert not (tmp_path / "no.svg").exists()
+
+
+@pytest.mark.slow
+def test_a_program_that_makes_it_worse_is_not_written_unless_one_says_so(
+    workspace: Path, tmp_path: Path
+) -> None:
+    """A cycle of two minutes for a street with little traffic."""
+    file = placed(
+        workspace, scenario(None, walkers=0.0), "signal_crossing", tmp_path / "one.scenario.json"
+    )
+    out = tmp_path / "slow.scenario.json"
+    slow = ("signals", "webster", file, "-o", out, "--shortest", 120, "--seeds", "1,2,3",
+            "--workspace", workspace)  # fmt: skip
+    refused = odscen(*slow, "--json")
+    assert refused.code == 2
+    assert "worse than today. Nothing was written" in refused.json["error"]["message"]
+    assert not out.exists()
+    assert odscen(*slow, "--anyway").code == 0
+    told = odscen(
+        "signals", "evaluate", out, "--seeds", "1,2,3", "--workspace", workspace, "--json"
+    ).json
+    assert told["verdict"] == "worse"
+    assert told["figures"]["mean_delay"]["low"] > 0.0

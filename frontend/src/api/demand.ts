@@ -12,6 +12,8 @@ export type Counts = Schemas["Counts"];
 export type RouteChoice = Schemas["RouteChoice"];
 export type TripParking = Schemas["TripParking"];
 export type VehicleInput = Schemas["VehicleInput"];
+/** Whether vehicles come at random, or as many as are said with every seed. */
+export type Arrivals = VehicleInput["arrivals"];
 /** Where vehicles can drive into the region. */
 export type Entry = Schemas["EntryPlace"];
 /** One of the three amounts is not null. */

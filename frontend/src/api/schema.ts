@@ -990,6 +990,11 @@ export interface components {
             begin: number;
             end: number | null;
             profile: string | null;
+            /**
+             * @default even
+             * @enum {string}
+             */
+            arrivals: "even" | "random";
             mix: {
                 car?: number;
                 van?: number;
@@ -2598,6 +2603,11 @@ export interface components {
             begin: number;
             end: number | null;
             profile: string | null;
+            /**
+             * @default even
+             * @enum {string}
+             */
+            arrivals: "even" | "random";
             mix: {
                 car?: number;
                 van?: number;
@@ -3815,6 +3825,8 @@ export interface components {
             begin?: number;
             end?: number | null;
             profile?: string | null;
+            /** @enum {string} */
+            arrivals?: "even" | "random";
             mix?: {
                 car?: number;
                 van?: number;
@@ -3990,6 +4002,8 @@ export interface components {
             begin?: number;
             end?: number | null;
             profile?: string | null;
+            /** @enum {string} */
+            arrivals?: "even" | "random";
             mix?: {
                 car?: number;
                 van?: number;
@@ -4005,6 +4019,7 @@ export interface components {
             per_hour?: number | null;
             volumes?: number[];
             interval?: number;
+            peak_hour_factor?: number | null;
             to?: [
                 string,
                 number
@@ -4054,6 +4069,8 @@ export interface components {
             begin?: number;
             end?: number | null;
             profile?: string | null;
+            /** @enum {string} */
+            arrivals?: "even" | "random";
             mix?: {
                 car?: number;
                 van?: number;
@@ -4151,6 +4168,8 @@ export interface components {
             kind: "set_profile";
             profile: string;
             shares: number[];
+            begin?: number | null;
+            end?: number | null;
         };
         /** @description Change how trips of the demand choose their routes. */
         SetRoutesEdit: {
@@ -5116,6 +5135,8 @@ export interface components {
          *     with growing s. ``per_hour`` are all lanes together, with a ``profile`` on average over a day;
          *     or ``volumes`` are counted vehicles of slices of ``interval`` seconds from ``begin`` on. ``to``
          *     are zones or segments with their shares; without it, each draws one of the ends of the region.
+         *     ``peak_hour_factor`` is the volume of an hour divided by four times that of its busiest quarter,
+         *     which is the second of each hour from ``begin`` on; the other three are alike.
          */
         VehicleInput: {
             id: string;
@@ -5123,6 +5144,11 @@ export interface components {
             begin: number;
             end: number | null;
             profile: string | null;
+            /**
+             * @default even
+             * @enum {string}
+             */
+            arrivals: "even" | "random";
             mix: {
                 car?: number;
                 van?: number;
@@ -5141,6 +5167,7 @@ export interface components {
             volumes: number[];
             /** @default 900 */
             interval: number;
+            peak_hour_factor: number | null;
             /** @default [] */
             to: [
                 string,

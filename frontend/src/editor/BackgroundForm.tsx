@@ -6,7 +6,7 @@ import type { Edit, FieldsOf } from "../api/types";
 import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { AMOUNTS, amountOf } from "./demand";
-import { MixFold, PartCard, WindowFields } from "./DemandParts";
+import { ArrivalsChoice, MixFold, PartCard, WindowFields } from "./DemandParts";
 
 /** Vehicles with random starts and goals: how many, when, and their mix. */
 export function BackgroundForm({
@@ -52,6 +52,7 @@ export function BackgroundForm({
         profiles={profiles}
         onChange={(profile) => change({ profile })}
       />
+      <ArrivalsChoice value={background.arrivals} onChange={(arrivals) => change({ arrivals })} />
       <MixFold mix={background.mix} onChange={(mix) => change({ mix })} />
     </PartCard>
   );

@@ -1,9 +1,9 @@
-import { ActionIcon, Button, Collapse, Group, Text } from "@mantine/core";
+import { ActionIcon, Button, Collapse, Group, Select, Text } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useState } from "react";
 
-import type { Counts, Matrix, Mix, Zone } from "../api/demand";
+import type { Arrivals, Counts, Matrix, Mix, Zone } from "../api/demand";
 import type { Edit, FieldsOf } from "../api/types";
 import { IconTrash } from "../ui/icons";
 import { span } from "../ui/words";
@@ -81,6 +81,28 @@ export function WindowFields({
   );
 }
 
+/** Whether the numbers are means of random arrivals, or as many come as are said. */
+export function ArrivalsChoice({
+  value,
+  onChange,
+}: {
+  value: Arrivals;
+  onChange: (arrivals: Arrivals) => void;
+}) {
+  return (
+    <Select
+      label={t`Arrivals`}
+      data={[
+        { value: "random", label: t`at random (Poisson)` },
+        { value: "even", label: t`as many as said, with every seed` },
+      ]}
+      value={value}
+      allowDeselect={false}
+      onChange={(chosen) => onChange(chosen === "even" ? "even" : "random")}
+    />
+  );
+}
+
 /** The mix in a line; the shares open on demand. */
 export function MixFold({
   mix,
@@ -125,6 +147,7 @@ export function MatrixForm({
     <PartCard name={matrix.id} what={t`Trips between zones`} note={note} onRemove={onRemove}>
       <WindowFields begin={matrix.begin} end={matrix.end} onChange={change} />
       <ProfileChoice value={matrix.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
+      <ArrivalsChoice value={matrix.arrivals} onChange={(arrivals) => change({ arrivals })} />
       <MixFold mix={matrix.mix} pedestrians onChange={(mix) => change({ mix })} />
     </PartCard>
   );

@@ -9,7 +9,7 @@ import { reasonOf } from "../ui/reason";
 import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { freeName } from "./demand";
-import { MixFold, PartCard, WindowFields } from "./DemandParts";
+import { ArrivalsChoice, MixFold, PartCard, WindowFields } from "./DemandParts";
 import type { EditorStore } from "./store";
 
 /** Vehicles an hour and lane that a new input begins with. */
@@ -68,8 +68,20 @@ export function InputForm({
             profiles={profiles}
             onChange={(profile) => change({ profile })}
           />
+          <Committed
+            label={t`Peak hour factor`}
+            suffix=""
+            min={0.25}
+            max={1}
+            step={0.01}
+            digits={2}
+            placeholder={t`none`}
+            value={input.peak_hour_factor ?? ""}
+            onCommit={(peak_hour_factor) => change({ peak_hour_factor })}
+          />
         </>
       )}
+      <ArrivalsChoice value={input.arrivals} onChange={(arrivals) => change({ arrivals })} />
       <MixFold mix={input.mix} onChange={(mix) => change({ mix })} />
       <Group>
         <Button size="compact-sm" variant="default" onClick={() => onShow([input.segment])}>

@@ -137,6 +137,7 @@ test("background traffic has one amount, in the unit that is chosen", async () =
     begin: 0,
     end: null,
     profile: null,
+    arrivals: "even",
     mix: { car: 1 },
     fill: null,
     per_km: 5,

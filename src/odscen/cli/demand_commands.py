@@ -46,6 +46,15 @@ DayOption = Annotated[
     typer.Option("--day", help="Day profile: weekday, weekend, or one of the scenario's own."),
 ]
 
+ArrivalsOption = Annotated[
+    str,
+    typer.Option(
+        help="random: as in a Poisson process, the numbers are means over seeds; even: as many as "
+        "are said, with every seed.",
+        metavar="random|even",
+    ),
+]
+
 TrialOption = Annotated[
     bool,
     typer.Option(
@@ -121,6 +130,7 @@ def import_(
     name: NameOption = None,
     mix: MixOption = None,
     day: DayOption = None,
+    arrivals: ArrivalsOption = "random",
     out: OutOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
@@ -151,8 +161,9 @@ def import_(
             "name a FILE to import, or a table: --od, --inputs, --counts, --profile or --zones"
         )
     for kind, file in given.items():
+        more = {"arrivals": arrivals} if kind in ("inputs", "od") else {}
         document = demands.import_demand(
-            store, document, file, kind=kind, name=name, day=day, **common
+            store, document, file, kind=kind, name=name, day=day, **common, **more
         )
     options = ReadingOptions(
         columns=_parse_columns(columns),
@@ -226,6 +237,7 @@ def add(
     name: NameOption = None,
     mix: MixOption = None,
     day: DayOption = None,
+    arrivals: ArrivalsOption = "random",
     out: OutOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
@@ -242,6 +254,7 @@ def add(
 
     amounts = {"fill": fill, "per_km": per_km, "trips": trips}
     fields: dict[str, Any] = {key: value for key, value in amounts.items() if value is not None}
+    fields["arrivals"] = arrivals
     if mix:
         fields["mix"] = parse_mix(mix)
     if day:
@@ -264,7 +277,23 @@ def add(
 def inflow(
     scenario: ScenarioArgument,
     segment: Annotated[str, typer.Option(help="Segment on which they drive in.")],
-    per_hour: Annotated[float, typer.Option(min=0, help="Vehicles an hour, on all lanes.")],
+    per_hour: Annotated[
+        float | None, typer.Option(min=0, help="Vehicles an hour, on all lanes.")
+    ] = None,
+    quarters: Annotated[
+        str | None,
+        typer.Option(
+            help="Or vehicles an hour in each quarter of an hour from the start on.",
+            metavar="420,510,600,480",
+        ),
+    ] = None,
+    peak_hour_factor: Annotated[
+        float | None,
+        typer.Option(
+            min=0.25, max=1, help="Volume of an hour by four times that of its busiest quarter."
+        ),
+    ] = None,
+    arrivals: ArrivalsOption = "random",
     direction: Annotated[
         str | None, typer.Option(help="forward or backward, where both lead in.")
     ] = None,
@@ -292,7 +321,16 @@ def inflow(
     from odscen.app.demand import demands
     from odscen.maps.store import Workspace
 
-    fields: dict[str, Any] = {"segment": segment, "per_hour": per_hour, "direction": direction}
+    if (per_hour is None) == (quarters is None):
+        raise InputError("say how many vehicles come: by --per-hour or by --quarters")
+    fields: dict[str, Any] = {"segment": segment, "direction": direction, "arrivals": arrivals}
+    if quarters is None:
+        fields["per_hour"] = per_hour
+    else:
+        rates = _split_rates(quarters)
+        fields |= {"volumes": rates, "interval": 900.0, "end": 900.0 * len(rates)}
+    if peak_hour_factor is not None:
+        fields["peak_hour_factor"] = peak_hour_factor
     if lanes:
         fields["lanes"] = _lane_ids(lanes)
     if to:
@@ -433,6 +471,14 @@ def parse_shares(text: str, *, example: str) -> dict[str, float]:
         except ValueError:
             raise InputError(f"shares are written as {example}, not {text!r}") from None
     return found
+
+
+def _split_rates(text: str) -> tuple[float, ...]:
+    """Vehicles of each quarter of an hour, from their rates an hour."""
+    try:
+        return tuple(float(part) / 4.0 for part in text.split(","))
+    except ValueError:
+        raise InputError(f"quarters are written as 420,510,600,480, not {text!r}") from None
 
 
 def _lane_ids(text: str) -> tuple[int, ...]:

@@ -246,7 +246,7 @@ def run(
             processes=jobs,
             reports=reports,
             figures=reports or as_json,
-            reporter=_BarReporter(step, len(paths) * len(seeds or (None,))),
+            reporter=BarReporter(step, len(paths) * len(seeds or (None,))),
         )
     show_results(results, as_json=as_json, several=len(results) > 1 or scenarios[0].is_dir())
     if seeds is not None:
@@ -278,7 +278,7 @@ def _run_until_confident(
     for path in paths:
         runs, found = run_until_confident(
             store, path, share=wanted, figure=figure, most=most, settings=settings, out=out,
-            overwrite=overwrite, processes=processes, reports=reports, reporter=_BarReporter(),
+            overwrite=overwrite, processes=processes, reports=reports, reporter=BarReporter(),
             seeds=tuple(range(1, FEWEST + 1)) if seeds is None else seeds,
         )  # fmt: skip
         results += runs
@@ -351,7 +351,7 @@ def resume(
             Workspace.open(workspace),
             run,
             time_limit=time_limit,
-            reporter=_BarReporter(step).of_run(run.name),
+            reporter=BarReporter(step).of_run(run.name),
             behaviour=driven,
         )
     show_results([result], as_json=as_json, several=False)
@@ -405,7 +405,7 @@ def _say_verdicts(result: Run) -> None:
         log(f"{result.folder.name}: failed: {has}")
 
 
-class _BarReporter(Reporter):
+class BarReporter(Reporter):
     """Shows runs that go on at the same time as one bar; what they say is logged.
 
     ``show`` gets words and the share done of ``total`` runs.
@@ -417,7 +417,7 @@ class _BarReporter(Reporter):
         self._name = ""
 
     def of_run(self, name: str) -> Reporter:
-        own = _BarReporter(self._show, self._total)
+        own = BarReporter(self._show, self._total)
         own._shares, own._name = self._shares, name
         return own
 

@@ -4,17 +4,29 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table
+from odscen.base.errors import InputError
+from odscen.cli.console import (
+    JobsOption,
+    JsonOption,
+    SeedsOption,
+    WorkspaceOption,
+    log,
+    print_json,
+    print_table,
+    progress,
+)
 from odscen.cli.scenario_commands import ScenarioArgument
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from odscen.app.signals.signal_evaluation import SignalEvaluation
     from odscen.maps.store import Workspace
+    from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.signals.green_wave import Favoured
     from odscen.sumo.calibrate.light_timing import TimedLight
 
@@ -24,6 +36,16 @@ JunctionOption = Annotated[
 OutOption = Annotated[
     Path | None,
     typer.Option("-o", "--out", help="File to write. (default: the scenario itself)"),
+]
+
+TrialOption = Annotated[
+    bool,
+    typer.Option(
+        "--trial/--no-trial", help="Run it against what there was, with several seeds, first."
+    ),
+]
+AnywayOption = Annotated[
+    bool, typer.Option("--anyway", help="Write it also if it makes the mean delay longer.")
 ]
 
 app = typer.Typer(
@@ -163,6 +185,10 @@ def webster(
             "where the volumes ask for it."
         ),
     ] = False,
+    trial: TrialOption = True,
+    seeds: SeedsOption = None,
+    jobs: JobsOption = 1,
+    anyway: AnywayOption = False,
     out: OutOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
@@ -188,10 +214,15 @@ def webster(
         saturation=saturation,
         bounds=(shortest, longest),
     )
+    tried = (
+        _evaluate(store, timed.scenario, today=scenario, seeds=seeds, jobs=jobs) if trial else None
+    )
+    _refuse_worse(tried, anyway=anyway)
     path = scenarios.write_scenario(timed.scenario, out or scenario)
     if as_json:
         found = {"arrows": [arrow._asdict() for arrow in arrows]} if turn_arrows else {}
-        print_json({"scenario": str(path), **timed.to_dict(), **found})
+        more = {} if tried is None else {"evaluation": tried.to_dict()}
+        print_json({"scenario": str(path), **timed.to_dict(), **found, **more})
         return
     for words in arrow_words(arrows) if turn_arrows else ():
         log(words)
@@ -201,6 +232,8 @@ def webster(
         log(f"junction {name}: no vehicle comes to its light, which keeps its times")
     for name in timed.oversaturated:
         log(f"junction {name} is oversaturated: more vehicles come than its greens carry")
+    if tried is not None:
+        log(tried.words)
     log(f"demand of {timed.begin:g} to {timed.end:g} s; wrote {path}")
 
 
@@ -226,6 +259,10 @@ def coordinate(
     svg: Annotated[
         Path | None, typer.Option("--svg", help="Write the time-space diagram here.")
     ] = None,
+    trial: TrialOption = True,
+    seeds: SeedsOption = None,
+    jobs: JobsOption = 1,
+    anyway: AnywayOption = False,
     out: OutOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
@@ -236,8 +273,9 @@ def coordinate(
     from odscen.base.text_files import write_text
     from odscen.maps.store import Workspace
 
+    store = Workspace.open(workspace)
     found = coordinate_signals(
-        Workspace.open(workspace),
+        store,
         scenario,
         junctions=_split_list(junctions),
         along=_split_list(along),
@@ -245,12 +283,19 @@ def coordinate(
         speed=None if speed is None else speed / 3.6,
         cycle=cycle,
     )
+    if not (found.worth_it or anyway):
+        raise InputError(f"{' '.join(found.doubts)} With --anyway it is written all the same")
+    tried = (
+        _evaluate(store, found.scenario, today=scenario, seeds=seeds, jobs=jobs) if trial else None
+    )
+    _refuse_worse(tried, anyway=anyway)
     path = scenarios.write_scenario(found.scenario, out or scenario)
     if svg is not None:
         write_text(svg, found.to_svg())
     if as_json:
         drawn = {} if svg is None else {"svg": str(svg)}
-        print_json({"scenario": str(path), **drawn, **found.to_dict()})
+        more = {} if tried is None else {"evaluation": tried.to_dict()}
+        print_json({"scenario": str(path), **drawn, **found.to_dict(), **more})
         return
     rows = [
         (", ".join(light.junctions), round(light.metres), light.offset, light.wave.out_time)
@@ -262,7 +307,76 @@ def coordinate(
     ):
         share = 100.0 * band.seconds / found.cycle
         log(f"band {name}: {band.seconds:.1f} s, {share:.0f} % of the cycle (was {before:.1f} s)")
+    for words in found.doubts:
+        log(words)
+    if tried is not None:
+        log(tried.words)
     log(f"wrote {path}" + ("" if svg is None else f" and {svg}"))
+
+
+@app.command()
+def evaluate(
+    scenario: ScenarioArgument,
+    today: Annotated[
+        Path | None,
+        typer.Option(
+            help="Scenario whose programs are those of today. (default: the map's own programs)"
+        ),
+    ] = None,
+    seeds: SeedsOption = None,
+    jobs: JobsOption = 1,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run the programs of a scenario against those of today, in pairs of one seed.
+
+    Demand, closures and everything else are those of the scenario on both sides. The mean delay
+    of all road users decides, waits outside included, with its 95 % interval.
+    """
+    from odscen.maps.store import Workspace
+
+    found = _evaluate(Workspace.open(workspace), scenario, today=today, seeds=seeds, jobs=jobs)
+    if as_json:
+        print_json(found.to_dict())
+        return
+    rows = [
+        (
+            name,
+            *("-" if value is None else f"{value:,.2f}" for value in (one.a, one.b)),
+            "-" if one.low is None else f"{one.low:+,.2f} to {one.high:+,.2f}",
+            one.finding.value,
+        )
+        for name, one in found.differences.items()
+    ]
+    print_table("", ["figure", "today", "evaluated", "difference, 95 %", "finding"], rows)
+    log(found.words)
+
+
+def _evaluate(
+    store: Workspace, scenario: Scenario | Path, *, today: Path | None, seeds: Any, jobs: int
+) -> SignalEvaluation:
+    """Run both sides, with a bar."""
+    from odscen.app.signals.signal_evaluation import SEEDS, evaluate_signals
+    from odscen.cli.run_commands import BarReporter
+
+    chosen = SEEDS if seeds is None else seeds
+    with progress("running") as step:
+        return evaluate_signals(
+            store, scenario, today=today, seeds=chosen, processes=jobs,
+            reporter=BarReporter(step, 2 * len(chosen)),
+        )  # fmt: skip
+
+
+def _refuse_worse(tried: SignalEvaluation | None, *, anyway: bool) -> None:
+    """Refuse what makes the mean delay longer.
+
+    Raises
+    ------
+    InputError
+        With what the runs say.
+    """
+    if tried is not None and tried.worse and not anyway:
+        raise InputError(f"{tried.words} Nothing was written; with --anyway it is")
 
 
 def _split_list(text: str | None) -> tuple[str, ...]:

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 from lxml import etree
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from odscen.base.errors import InputError, in_file
 from odscen.base.given_files import MOST
@@ -78,7 +80,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     report = ElementReport(source.file.name)
     if root.tag == "net":
         on_map = _bring(source, source.file, content, [], report)
-        scenario = _empty_scenario(source, on_map, SUMO_SEED)
+        scenario = _empty_scenario(source, on_map, SUMO_SEED, report)
         return FileContent(scenario, lists=report.lists)
     if root.tag not in _ROOTS:
         raise InputError(
@@ -99,7 +101,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     on_map = _bring(source, net_file, _unpacked(net_file.read()), programs, report)
     begin = seconds_of(options.get("begin")) or 0.0
     seed = int(float(options.get("seed") or SUMO_SEED))
-    scenario = _empty_scenario(source, on_map, max(0, min(seed, 2**31 - 1)))
+    scenario = _empty_scenario(source, on_map, max(0, min(seed, 2**31 - 1)), report)
     project = SumoProject(
         begin=begin,
         options=allowed_options({n: v for n, v in options.items() if n not in _OWN}),
@@ -295,12 +297,28 @@ def _with_programs(content: bytes, programs: Sequence[etree._Element]) -> tuple[
 # ---------------------------------------------------------------------------- the scenario
 
 
-def _empty_scenario(source: ImportSource, on_map: ImportMap, seed: int) -> Scenario:
+def _empty_scenario(
+    source: ImportSource, on_map: ImportMap, seed: int, report: ElementReport
+) -> Scenario:
+    """A scenario on the largest part of the map whose segments are connected."""
     graph = on_map.sumo_map.graph
+    ids = graph.segments.ids
+    one, other = graph.segments.adjacency.T
+    links = coo_array((np.ones(len(one)), (one, other)), shape=(len(ids), len(ids)))
+    _, part = connected_components(links, directed=False)
+    sizes = np.bincount(part, weights=graph.segments.lengths)
+    inside = part == int(np.argmax(sizes))
+    if not inside.all():
+        report.add(
+            "approximated",
+            "region",
+            f"{len(ids) - int(inside.sum())} of {len(ids)} segments are not connected to the rest; "
+            "they are not in the region of interest, but SUMO's traffic is there all the same",
+        )
     return edits.new_scenario(
         graph,
         name=source.name,
-        roi=[str(name) for name in graph.segments.ids],
+        roi=[str(name) for name, within in zip(ids, inside.tolist(), strict=True) if within],
         seed=seed,
         description="A SUMO project.",
     )
@@ -364,7 +382,7 @@ def _part_id(name: str | None) -> str:
 def _with_zones(
     scenario: Scenario, sumo_map: SumoMap, files: Sequence[_ReadFile], report: ElementReport
 ) -> Scenario:
-    graph = sumo_map.graph
+    graph, roi = sumo_map.graph, frozenset(scenario.roi)
     parts: dict[str, dict[str, Any]] = {}
     for file in files:
         for taz in file.root.iter("taz"):
@@ -378,8 +396,9 @@ def _with_zones(
                 for node in pair
             )
             name = _part_id(taz.get("id"))
-            if segments and name:
-                parts[name] = {"segments": tuple(segments)}
+            inside = tuple(segment for segment in segments if segment in roi)
+            if inside and name:
+                parts[name] = {"segments": inside}
                 report.add("taken", f"taz {taz.get('id')}", f"zone {name}", line=_line(taz))
     return put_parts(scenario, graph, "zones", parts) if parts else scenario
 

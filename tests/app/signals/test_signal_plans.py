@@ -366,3 +366,38 @@ def test_the_program_of_the_guide_fits_a_network_that_netconvert_has_read_and_wr
 
 def _phases(text: str) -> list[str]:
     return re.findall(r"<phase [^>]*>|<param key=.odscen.group[^>]*>", text)
+
+
+@pytest.mark.parametrize(
+    ("params", "words"),
+    [
+        ({"coordinated": "true", "cycleTime": "0"}, "cycleTime is '0', not a number above 0"),
+        ({"coordinated": "true", "cycleTime": "long"}, "cycleTime is 'long', not a number above 0"),
+        ({"coordinated": "true", "cycleTime": "nan"}, "cycleTime is 'nan', not a number above 0"),
+    ],
+)
+def test_parameters_of_a_program_that_are_no_numbers_are_refused(
+    workspace: Workspace, tmp_path: Path, params: dict[str, str], words: str
+) -> None:
+    first, yellow, red, second, end = NETS
+    once = [(20.0, first), (3.0, yellow), (5.0, red)]
+    file = written(tmp_path, [*once, (20.0, second), (3.0, end), (5.0, red)])
+    rows = "".join(f'<param key="{key}" value="{value}"/>' for key, value in params.items())
+    file.write_text(file.read_text().replace("</tlLogic>", f"{rows}</tlLogic>"))
+    with pytest.raises(InputError, match=words):
+        import_signals(workspace, placed(workspace, scenario(None)), file)
+
+
+@pytest.mark.parametrize("links", ["one 2", "9" * 5000, "-1", "0 0"])
+def test_groups_of_our_own_file_that_name_no_links_are_those_of_the_light(
+    workspace: Workspace, tmp_path: Path, links: str
+) -> None:
+    one = placed(workspace, scenario(one_plan()))
+    file = tmp_path / "signals.add.xml"
+    text = export_signals(workspace, one)
+    changed = re.sub(r'(key="odscen\.group\.[^"]*" value=")[^"]*', rf"\g<1>{links}", text, count=1)
+    assert changed != text
+    file.write_text(changed)
+    back, _ = import_signals(workspace, plain(one), file)
+    before, after = one.signals.junctions[0], back.signals.junctions[0]
+    assert len(after.groups) == len(before.groups)

@@ -201,7 +201,11 @@ def test_tables_are_read_with_seconds_or_times_of_day() -> None:
         (0, 900): ((("a", "b", 3), ("b", "a", 1)), (2, 4)),
         (900, 1800): ((("a", "b", 4),), (3,)),
     }
-    assert read_profile("time,share\n0:00,1\n12:00,3\n") == (1, 3)
+    assert read_profile("time,share\n0:00,1\n12:00,3\n") == ((1, 3), None, None)
+    seven_to_nine = "time,share\n" + "".join(
+        f"{7 + k // 4}:{15 * (k % 4):02},{k}\n" for k in range(8)
+    )
+    assert read_profile(seven_to_nine) == (tuple(range(8)), 7 * 3600, 9 * 3600)
     assert read_zones("zone,segment\nn,r1\nn,r2\n") == {"n": (("r1", "r2"), (2, 3))}
 
 
@@ -213,7 +217,9 @@ def test_tables_are_read_with_seconds_or_times_of_day() -> None:
         (read_matrix, "from,to,trips\na,b\n", "line 2: 2 values for 3 columns"),
         (read_matrix, "from,to,trips\n", "no lines below the first"),
         (read_counts, "place,begin,end,count\nr1,900,0,3\n", "line 2: the slice from 900 to 0"),
-        (read_profile, "time,share\n0:00,1\n13:00,3\n", "line 3: time '13:00'"),
+        (read_profile, "time,share\n0:00,1\n7:00,3\n13:00,3\n", "line 4: time '13:00'"),
+        (read_profile, "time,share\n0:00,1\n13:00,3\n", "line 3: 2 slices of 780 min end after"),
+        (read_profile, "time,share\n7:00,1\n", "line 2: one slice has no length"),
         (read_zones, "zone,segment\nold town,r1\n", "line 2: zone must be .*not 'old town'"),
         (read_counts, "place,begin,end,count\nr1," + "9" * 200_000, "line 2: this is no table"),
     ],
@@ -225,7 +231,7 @@ def test_a_table_that_cannot_be_used_is_refused_with_its_line(read, text, messag
 
 @pytest.mark.slow
 def test_a_table_has_as_many_lines_as_it_may_have_and_no_more() -> None:
-    assert len(read_profile("share\n" + "1\n" * MOST_ROWS)) == MOST_ROWS
+    assert len(read_profile("share\n" + "1\n" * MOST_ROWS).shares) == MOST_ROWS
     with pytest.raises(InputError, match=r"^line 500002: there are more than 500000 lines"):
         read_profile("share\n" + "1\n" * (MOST_ROWS + 1))
 
@@ -247,7 +253,12 @@ def test_a_profile_between_clock_times_has_its_slices_there_and_nothing_else() -
     found = curve(Demand(profiles=(early,)), "early")
     quarter = [found.amount(t + 900.0) - found.amount(t) for t in range(0, 86_400, 900)]
     assert sum(quarter[:28]) == sum(quarter[36:]) == 0.0
-    assert quarter[28:36] == pytest.approx([86_400.0 * k / 16 for k in (1, 1, 2, 4, 4, 2, 1, 1)])
+    # The mean of these two hours is 1: what is said of an hour is said of them.
+    assert quarter[28:36] == pytest.approx([7200.0 * k / 16 for k in (1, 1, 2, 4, 4, 2, 1, 1)])
+    next_day = found.amount(86_400.0 + 8 * 3600.0) - found.amount(86_400.0)
+    assert next_day == pytest.approx(3600.0)
+    drawn = found.draw(np.linspace(0, 1, 9), begin=86_400.0, end=2 * 86_400.0)
+    assert drawn[4] == pytest.approx(86_400.0 + 8 * 3600.0)
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,28 @@ def widening() -> Any:
 WIDE = widening()
 
 
+def closed_town() -> Any:
+    """Two roads, each of which leads through a junction into the other."""
+    places = (("1", "r1"), ("8", "j8"), ("2", "r2"), ("9", "j9"))
+    lanes = [
+        ToyLane(
+            key(road, -1),
+            0.0 if number % 2 else 120.0 * number,
+            60.0 * number,
+            0.0,
+            100.0,
+            segment,
+            next=(key(places[(number + 1) % 4][0], -1),),
+            junction=segment[1:] if segment.startswith("j") else None,
+        )
+        for number, (road, segment) in enumerate(places)
+    ]
+    pairs = [
+        (one[1], other[1]) for one, other in zip(places, (*places[1:], places[0]), strict=True)
+    ]
+    return map_graph(lanes, adjacency=pairs)
+
+
 def with_input(graph: Any = FORK, roi: tuple[str, ...] = WHOLE, **fields: Any) -> Scenario:
     scenario = edits.new_scenario(graph, name="test", roi=roi, seed=fields.pop("seed", 3))
     scenario = edits.set_simulation(scenario, duration=fields.pop("duration", 3600))
@@ -82,7 +104,7 @@ def test_a_lane_that_begins_where_the_road_widens_is_no_entry() -> None:
 
 
 def test_as_many_come_as_were_counted_in_each_slice() -> None:
-    made = wide(volumes=(10, 0, 25, 7), interval=300, duration=900)
+    made = wide(volumes=(10, 0, 25, 7), interval=300, duration=900, arrivals="even")
     assert [len(one.departs) for one in made] == [10, 0, 25]
     for number, one in enumerate(made):
         assert np.all((one.departs >= 300 * number) & (one.departs < 300 * (number + 1)))
@@ -98,6 +120,73 @@ def test_vehicles_share_the_lanes_and_keep_a_headway() -> None:
             gaps = np.diff(np.sort(one.departs[one.starts == lane]))
             assert gaps.min() >= LEAST_HEADWAY - 0.011
             assert gaps.std() > 0.5
+
+
+def test_arrivals_of_many_seeds_scatter_as_poisson_does() -> None:
+    """Variance over mean of the vehicles of a quarter of an hour is 1, from seed to seed."""
+
+    def numbers(**fields: Any) -> np.ndarray[Any, Any]:
+        return np.array(
+            [
+                [len(one.departs) for one in wide(per_hour=600.0, seed=seed, **fields)]
+                for seed in range(200)
+            ],
+            dtype=float,
+        )
+
+    random = numbers()
+    assert random.shape == (200, 4)
+    assert random.mean() == pytest.approx(150.0, rel=0.02)
+    # Of 800 draws the ratio has a standard deviation of 0.05.
+    assert random.var(axis=0, ddof=1).mean() / random.mean() == pytest.approx(1.0, abs=0.15)
+    # Quarters do not make up for one another: the hour scatters as well.
+    assert random.sum(axis=1).var(ddof=1) / 600.0 == pytest.approx(1.0, abs=0.3)
+    assert set(numbers(arrivals="even").ravel()) == {150.0}
+
+
+def test_within_a_quarter_as_many_seconds_have_no_vehicle_as_poisson_says() -> None:
+    gaps = np.concatenate(
+        [
+            np.diff(np.sort(one.departs))
+            for seed in range(30)
+            for one in wide(per_hour=400.0, seed=seed)
+        ]
+    )
+    # Exponential gaps of two lanes together: standard deviation and mean are alike.
+    assert gaps.std() / gaps.mean() == pytest.approx(1.0, abs=0.06)
+
+
+def test_the_second_quarter_of_an_hour_has_what_the_peak_hour_factor_says() -> None:
+    made = wide(per_hour=1000.0, peak_hour_factor=0.8, arrivals="even", duration=7200)
+    numbers = [len(one.departs) for one in made]
+    assert sum(numbers) == pytest.approx(2000, abs=8)
+    assert numbers[1] == pytest.approx(1000 / (4 * 0.8), abs=1)
+    assert numbers[5] == pytest.approx(numbers[1], abs=1)
+    assert 1000 / (4 * max(numbers[:4])) == pytest.approx(0.8, abs=0.01)
+    with pytest.raises(ValueError, match="leave peak_hour_factor out"):
+        VehicleInput(id="a", segment="r1", volumes=(1, 2), peak_hour_factor=0.9)
+
+
+def test_documents_that_say_nothing_of_arrivals_have_even_ones_and_keep_their_bytes() -> None:
+    new = with_input(segment="r1", direction="forward", per_hour=100.0)
+    assert new.demand.inputs[0].arrivals == "random"
+    old = edits.set_input(new, FORK, inflow="west", arrivals="even")
+    assert "arrivals" not in dumps(old)
+    assert loads(dumps(old)).demand.inputs[0].arrivals == "even"
+    changed = edits.set_input(old, FORK, inflow="west", per_hour=200.0)
+    assert changed.demand.inputs[0].arrivals == "even"
+
+
+def test_in_a_closed_town_vehicles_can_begin_behind_every_junction() -> None:
+    ring = closed_town()
+    every = entries(Region.of(ring, ring.segments.ids))
+    assert [(one.segment, [lane.lane for lane in one.lanes]) for one in every] == [
+        ("r1", [-1]),
+        ("r2", [-1]),
+    ]
+    made = trips(with_input(ring, ("r1", "j8", "r2", "j9"), segment="r2", per_hour=300.0), ring)
+    assert sum(len(one.departs) for one in made) > 200
+    assert sum(one.unmet for one in made) == 0
 
 
 def test_trucks_come_on_the_outer_lane_and_cars_fill_the_others() -> None:
@@ -124,12 +213,13 @@ def test_destinations_are_met_in_the_shares_given() -> None:
     assert np.mean(segments == "r2") == pytest.approx(0.75, abs=0.02)
 
 
-def test_a_shorter_run_has_the_same_vehicles_up_to_its_end() -> None:
-    fields = {"segment": "r1", "direction": "forward", "per_hour": 900.0}
+@pytest.mark.parametrize("arrivals", ["even", "random"])
+def test_a_shorter_run_has_the_same_vehicles_up_to_its_end(arrivals: str) -> None:
+    fields = {"segment": "r1", "direction": "forward", "per_hour": 900.0, "arrivals": arrivals}
     whole, cut = trips(with_input(**fields)), trips(with_input(duration=1000, **fields))
     departs = np.concatenate([one.departs for one in whole])
     assert np.concatenate([one.departs for one in cut]).tolist() == departs[departs < 1000].tolist()
-    assert len(departs) == 900
+    assert len(departs) == 900 if arrivals == "even" else abs(len(departs) - 900) < 120
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def test_names_in_a_file_reach_nothing_on_the_disk(client: TestClient, tmp_path:
     (tmp_path / "cut_in.xosc").write_text(CUT_IN, encoding="utf-8")
     words = failure(client, ("v.xosc", varied), ("road.xodr", ROAD))
     assert words == (
-        "v.xosc: it varies the scenario 'cut_in.xosc', which was not sent with it; send both files"
+        "v.xosc: it needs the file 'cut_in.xosc', which was not sent with it; send both files"
     )
 
 

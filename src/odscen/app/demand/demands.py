@@ -122,7 +122,7 @@ def import_text(
     parts: dict[str, dict[str, Any]]
     if kind == "profile":
         own = name or "profile"
-        return edits.set_profile(scenario, graph, profile=own, shares=read_profile(text))
+        return edits.set_profile(scenario, graph, profile=own, **read_profile(text)._asdict())
     if kind == "counts":
         counted, own = read_counts(text, clock=clock), name or "counts"
         with _by_line(scenario, kind, {own: counted.lines}):

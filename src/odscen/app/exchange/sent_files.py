@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from odscen.app.exchange.imports import bare_map_name, plan_text, read_content
+from odscen.app.exchange.imports import bare_map_name, map_of_network, plan_text, read_content
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.checksums import digest
 from odscen.base.errors import InputError, OdscenError
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 _MOST_FILES: Final = 40
 _SCENARIO, _REPORT, _PLAN = "scenario.json", "report.json", "plan.json"
 """Files that a child writes; the last one if there is a plan."""
+_NETWORK: Final = "asked.net.xml"
+"""SUMO network that a child asks a map of."""
 
 
 class SentFile(NamedTuple):
@@ -130,7 +132,13 @@ def read_sent_scenario(
 
         seen = read_in_child(None)
         file, added = stories[seen["main"]].name, False
-        if seen["map"] is not None:
+        if seen.get("network") is not None:
+            before = workspace.map_names()
+            progress("making a map of the network", 0.1)
+            entry = map_of_network(workspace, seen["network"], (folder / _NETWORK).read_bytes())
+            added = entry.name not in before
+            read_in_child(entry.name)
+        elif seen["map"] is not None:
             entry, added = _settle_map(workspace, named, seen["map"], file, progress)
             read_in_child(entry.name)
         plan = folder / _PLAN
@@ -205,6 +213,14 @@ def _is_map(name: str) -> bool:
 # ---------------------------------------------------------------------------- in the child
 
 
+class _NetworkAskedError(OdscenError):
+    """A reader asks for the map of a SUMO network."""
+
+    def __init__(self, named: str, content: bytes) -> None:
+        self.named, self.content = named, content
+        super().__init__(named)
+
+
 class _MapAskedError(OdscenError):
     """A reader asks for a map that is not settled yet.
 
@@ -232,7 +248,8 @@ def read_sent(
     -------
     dict
         ``main``: which of the files it is; ``map``: the one that it asks for, as it names it, if
-        that was not given and nothing was written.
+        that was not given and nothing was written; ``network``: name of a SUMO network whose map it
+        asks for, which is then in the folder.
     """
     progress("reading the scenario" if map_name else "reading the file", 0.0)
     given = tuple((file["name"], Path(file["path"])) for file in files)
@@ -244,6 +261,11 @@ def read_sent(
             raise _MapAskedError(named)
         return store.map(map_name)
 
+    def bring(named: str, network: bytes) -> MapEntry:
+        if map_name is None:
+            raise _NetworkAskedError(named, network)
+        return store.map(map_name)
+
     try:
         content = read_content(
             store,
@@ -252,7 +274,11 @@ def read_sent(
             name=name_from_file(Path(given[main][0])),
             find_entry=find_entry,
             options=options,
+            bring=bring,
         )
+    except _NetworkAskedError as asked:
+        (Path(folder) / _NETWORK).write_bytes(asked.content)
+        return {"main": main, "map": None, "network": asked.named}
     except _MapAskedError as asked:
         return {"main": main, "map": asked.named}
     if content.scenario is None:
@@ -328,7 +354,7 @@ class _FileAmongSent:
             if name == bare and row != self.row:
                 return _FileAmongSent(row, self.given)
         raise InputError(
-            f"it varies the scenario {bare!r}, which was not sent with it; send both files",
+            f"it needs the file {bare!r}, which was not sent with it; send both files",
             file=self.name,
         )
 

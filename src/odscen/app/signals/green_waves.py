@@ -7,12 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
+from odscen.app.signals.program_editing import take_over_program
 from odscen.app.signals.signal_optimisation import chosen_lights
 from odscen.base.errors import InputError, NotFoundError
 from odscen.drawing.time_space import DiagramBand, DiagramLight, time_space_svg
 from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
-from odscen.scenario.signals.green_wave import Band, WaveLight, green_bands, widest_offsets
+from odscen.scenario.document.signals_document import JunctionTiming
+from odscen.scenario.signals.green_wave import (
+    LEAST_BAND,
+    Band,
+    WaveLight,
+    green_bands,
+    widest_offsets,
+)
 from odscen.sumo.calibrate.corridor_lights import CorridorFinder, wave_lights
 from odscen.sumo.calibrate.light_timing import (
     merged_phases,
@@ -32,7 +40,6 @@ if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.scenario.document.signals_document import JunctionTiming
     from odscen.scenario.signals.green_wave import Favoured
     from odscen.sumo.calibrate.corridor_lights import CorridorDirection
     from odscen.sumo.calibrate.light_timing import LightTimes
@@ -76,6 +83,30 @@ class Coordination:
     back: Band
     before: tuple[float, float]
 
+    @property
+    def worth_it(self) -> bool:
+        """Whether a direction has a band that vehicles fit into."""
+        return max(self.out.seconds, self.back.seconds) >= LEAST_BAND
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Which direction has no band to speak of, in sentences."""
+        narrow = [
+            (name, band)
+            for name, band in (("along", self.out), ("back", self.back))
+            if band.seconds < LEAST_BAND
+        ]
+        if len(narrow) == 2:
+            return (
+                f"There is no green wave: neither direction has a band of {LEAST_BAND:g} s; give "
+                "another cycle or speed, or fewer lights.",
+            )
+        return tuple(
+            f"There is no green wave {name}: its band of {band.seconds:.1f} s lets no vehicle "
+            "through that others follow."
+            for name, band in narrow
+        )
+
     def to_words(self) -> tuple[str, ...]:
         """What has come of it, in sentences."""
         offsets = ", ".join(
@@ -89,6 +120,7 @@ class Coordination:
                 f"the cycle (was {before:.0f} s)."
                 for name, band, before in bands
             ),
+            *self.doubts,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -99,6 +131,8 @@ class Coordination:
                 name: {**band._asdict(), "share": band.seconds / self.cycle}
                 for name, band in (("out", self.out), ("back", self.back))
             },
+            "worth_it": self.worth_it,
+            "doubts": list(self.doubts),
             "bands_before": dict(zip(("out", "back"), self.before, strict=True)),
             "lights": [
                 {
@@ -146,7 +180,9 @@ def coordinate_signals(
     """Give lights along a corridor one cycle, and the offsets with the widest bands.
 
     Stages and their order stay; greens are stretched in proportion where the cycle of a light is
-    another. Actuated lights with the map's stages become fixed-time ones.
+    another. Actuated lights with the map's stages become fixed-time ones; those with bus priority
+    get the map's program as an actuated one of the scenario, in which buses get green earlier while
+    the light keeps its place in the cycle.
 
     Parameters
     ----------
@@ -198,7 +234,25 @@ def coordinate_signals(
         )
     if along:
         numbers = finder.in_order(numbers)
+    scenario = _keep_priority(workspace, scenario, [loaded.lights[n].names for n in numbers])
     return _coordinate_lights(scenario, loaded, finder, numbers, favoured, speed, cycle)
+
+
+def _keep_priority(
+    workspace: Workspace, scenario: Scenario, lights: Sequence[tuple[str, ...]]
+) -> Scenario:
+    """Give lights with bus priority programs that come back to their place in the cycle."""
+    for names in lights:
+        timing = timing_of(scenario, names)
+        own = None if timing is None else timing.bus_priority
+        asked = scenario.signals.bus_priority if own is None else own
+        if not asked or (timing is not None and timing.stages):
+            continue
+        entry = timing or JunctionTiming(junction=names[0])
+        # Buses change the length of stages, which only an actuated program has.
+        entry = entry.model_copy(update={"control": "actuated", "bus_priority": True})
+        scenario = take_over_program(workspace, with_timings(scenario, [entry]), names[0])
+    return scenario
 
 
 def _coordinate_lights(

@@ -5,9 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import polars as pl
+
 from odscen.app.maps import map_of
+from odscen.app.running.runs import carry_out, check_run, prepare_run
 from odscen.app.scenarios import given_scenario
+from odscen.base.atomic_folders import scratch_folder
+from odscen.base.categories import Category
 from odscen.base.errors import InputError, NotFoundError
+from odscen.records.outcomes import RunStatus
+from odscen.runs.recorded import trajectory_files
+from odscen.runs.recording import Recording
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.signals.webster import LONGEST_CYCLE, SATURATION_FLOW, SHORTEST_CYCLE
@@ -18,7 +27,11 @@ from odscen.sumo.calibrate.light_timing import (
     timing_of,
     with_timings,
 )
-from odscen.sumo.calibrate.turning_volumes import planned_vehicles, turning_volumes
+from odscen.sumo.calibrate.turning_volumes import (
+    driven_vehicles,
+    planned_vehicles,
+    turning_volumes,
+)
 from odscen.sumo.realize.lights.light_realization import realized_lights
 
 if TYPE_CHECKING:
@@ -28,7 +41,7 @@ if TYPE_CHECKING:
     from odscen.app.maps import LoadedMap
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
-    from odscen.sumo.calibrate.turning_volumes import Volumes
+    from odscen.sumo.calibrate.turning_volumes import PlannedVehicle, Volumes
 
 
 _MOST_SATURATION = 100_000.0
@@ -105,8 +118,8 @@ def time_signals(
 ) -> TimedSignals:
     """Give lights the cycle and greens of Webster's method for the demand of the scenario.
 
-    Volumes are those of the routes that a run has, of vehicles that depart in the interval. Stages,
-    intergreens and offsets stay.
+    Volumes are those of the routes that a run has, see :func:`coming_vehicles`. Stages, intergreens
+    and offsets stay.
 
     Parameters
     ----------
@@ -144,7 +157,7 @@ def time_signals(
     problems = signal_problems(scenario.signals, loaded.lights)
     # Lights of one coordination get one cycle here, as when an arrow has made that of one longer.
     refuse_errors(problem for problem in problems if problem.code != "cycles_of_coordination")
-    vehicles = list(planned_vehicles(scenario, loaded.sumo))
+    vehicles = coming_vehicles(workspace, scenario)
     volumes = turning_volumes(vehicles, duration=scenario.simulation.duration, begin=begin, end=end)
     timer = _Timer(scenario, loaded, volumes, saturation, bounds)
     lights = {number: timer.timed(number) for number in chosen}
@@ -159,6 +172,43 @@ def time_signals(
     new = with_timings(scenario, entries)
     refuse_errors(signal_problems(new.signals, loaded.lights))
     return TimedSignals(new, volumes.begin, volumes.end, tuple(timed.values()), without)
+
+
+def coming_vehicles(workspace: Workspace, scenario: Scenario) -> list[PlannedVehicle]:
+    """Vehicles that come to the lights of a scenario, by their routes.
+
+    Those that are planned, counted when they depart; where measures lead drivers around, or routes
+    go by travel time, those of a run with the seed of the scenario, counted when they pass.
+
+    Raises
+    ------
+    InputError
+        If that run fails.
+    ScenarioError
+        With every problem of the scenario.
+    """
+    if not scenario.measures and scenario.demand.routes.by != "travel_time":
+        return list(planned_vehicles(scenario, map_of(workspace, scenario).sumo))
+    settings = RunSettings(
+        recording=Recording(emissions=False), slice_length=None, warm_up=0.0, seed=scenario.seed
+    )
+    with scratch_folder() as folder:
+        checked = check_run(workspace, scenario, name="counted", out=folder, settings=settings)
+        run = carry_out(checked, prepare_run(checked), reports=False, figures=False)
+        if run.status != RunStatus.COMPLETED:
+            raise InputError(
+                f"the run in which vehicles are counted has not completed: {run.status}"
+            )
+        users = run.actors()
+        categories = {
+            name: Category(category)
+            for name, category in users.select("id", "category").iter_rows()
+            if category != Category.PEDESTRIAN
+        }
+        files = trajectory_files(run.folder)
+        if not files:
+            return []
+        return list(driven_vehicles(pl.scan_parquet(files), checked.map.sumo, categories))
 
 
 def chosen_lights(loaded: LoadedMap, junctions: Sequence[str]) -> list[int]:

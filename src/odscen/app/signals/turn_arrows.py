@@ -17,7 +17,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
 from odscen.app.signals.program_editing import take_over_program
-from odscen.app.signals.signal_optimisation import chosen_lights, refuse_interval
+from odscen.app.signals.signal_optimisation import (
+    chosen_lights,
+    coming_vehicles,
+    refuse_interval,
+)
 from odscen.convert.model.net import CROSSED
 from odscen.convert.signals.shared_green import MOST_STAGES
 from odscen.scenario.checks.signal_checks import signal_problems
@@ -28,7 +32,6 @@ from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.sumo.calibrate.light_timing import timing_of, with_timings
 from odscen.sumo.calibrate.turning_volumes import (
     DRIVEN,
-    planned_vehicles,
     turning_volumes,
     turns_of,
 )
@@ -125,7 +128,7 @@ def with_turn_arrows(
     refuse_interval(scenario, begin, end)
     lights = chosen_lights(loaded, junctions)
     refuse_errors(signal_problems(scenario.signals, loaded.lights))
-    vehicles = list(planned_vehicles(scenario, loaded.sumo))
+    vehicles = coming_vehicles(workspace, scenario)
     duration = scenario.simulation.duration
     volumes = turning_volumes(vehicles, duration=duration, begin=begin, end=end).by_turn
     net = loaded.sumo.net

@@ -300,7 +300,7 @@ def _document_problems(scenario: Scenario) -> Iterator[Problem]:
             " that are closer from colliding; raise the headway or shorten the step"
         )
         yield error("headway_below_step", "drivers.headway", message)
-    traffic = scenario.flows, scenario.demand.parts, scenario.transit.lines
+    traffic = scenario.flows, scenario.demand.parts, scenario.transit.lines, scenario.sumo
     if not scenario.actors and not any(traffic):
         yield warning(
             "no_actors", "actors", "there are neither actors nor flows; nothing will move"

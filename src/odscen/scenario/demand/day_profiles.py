@@ -42,13 +42,18 @@ class Curve:
         Relative shares of equal slices of the day, from midnight on.
     clock
         Time of day at the start of the run, seconds.
+    seconds
+        Of the part of the day over which the mean of the factor is 1.
     """
 
-    def __init__(self, shares: tuple[float, ...] = (1.0,), *, clock: float = 0.0) -> None:
+    def __init__(
+        self, shares: tuple[float, ...] = (1.0,), *, clock: float = 0.0, seconds: float = DAY
+    ) -> None:
         self._times = np.linspace(0.0, DAY, len(shares) + 1)
         # A share that a day's sum cannot hold would make the inverse infinitely steep.
         held = [share if share > sum(shares) * _LEAST_SHARE else 0.0 for share in shares]
-        self._sums = np.concatenate([[0.0], np.cumsum(held)]) * (DAY / sum(held))
+        self._sums = np.concatenate([[0.0], np.cumsum(held)]) * (seconds / sum(held))
+        self._day = float(self._sums[-1])
         self._clock = clock
         self._before = float(self._integrate_to(np.array(clock)))
 
@@ -58,7 +63,7 @@ class Curve:
 
     def times(self, amounts: FloatArray) -> FloatArray:
         """Inverse of :meth:`amount`, for many at once."""
-        days, rest = np.divmod(amounts + self._before, DAY)
+        days, rest = np.divmod(amounts + self._before, self._day)
         times: FloatArray = days * DAY + np.interp(rest, self._sums, self._times) - self._clock
         return times
 
@@ -79,7 +84,7 @@ class Curve:
 
     def _integrate_to(self, time_of_day: FloatArray) -> FloatArray:
         days, rest = np.divmod(time_of_day, DAY)
-        integral: FloatArray = days * DAY + np.interp(rest, self._times, self._sums)
+        integral: FloatArray = days * self._day + np.interp(rest, self._times, self._sums)
         return integral
 
 
@@ -96,7 +101,8 @@ def curve(demand: Demand, profile: str | None) -> Curve:
     known = known_profiles(demand)
     if profile not in known:
         raise NotFoundError("day profile", profile, list(known))
-    return Curve(known[profile], clock=demand.clock)
+    own = {part.id: part.seconds for part in demand.profiles}
+    return Curve(known[profile], clock=demand.clock, seconds=own.get(profile, DAY))
 
 
 def known_profiles(demand: Demand) -> dict[str, tuple[float, ...]]:

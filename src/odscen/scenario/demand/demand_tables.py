@@ -62,6 +62,17 @@ class _WideTable(NamedTuple):
     slices: list[tuple[str, TimeSlice]]
 
 
+class ProfileTable(NamedTuple):
+    """Shares of equal slices of the time from ``begin`` to ``end``, seconds after midnight.
+
+    Both are ``None`` where the slices are of the whole day.
+    """
+
+    shares: tuple[float, ...]
+    begin: float | None
+    end: float | None
+
+
 class Rows(NamedTuple, Generic[_Row]):
     """Rows of a table, and the line of the file that each is on, so that errors can name it."""
 
@@ -149,10 +160,11 @@ def read_inputs(text: str, *, clock: float = 0.0) -> tuple[InputRow, ...]:
     )
 
 
-def read_profile(text: str) -> tuple[float, ...]:
-    """Read a day profile: column ``share``, one line for each of equal slices of the day.
+def read_profile(text: str) -> ProfileTable:
+    """Read a day profile: column ``share``, one line for each of equal slices of time.
 
-    A column ``time`` may name the slices; it must then begin at midnight and be evenly spaced.
+    A column ``time`` may name the begin of each; they are then evenly spaced, and of the time from
+    the first to one slice after the last. Without it they are of the whole day.
 
     Raises
     ------
@@ -160,15 +172,28 @@ def read_profile(text: str) -> tuple[float, ...]:
         With the line and the value that cannot be used.
     """
     lines = list(_read_lines(text, COLUMNS["profile"], ("time",)))
+    shares = tuple(line.number("share") for line in lines)
+    if not lines[0].has("time"):
+        return ProfileTable(shares, None, None)
+    begins = [line.time("time", 0.0) for line in lines]
+    if len(lines) == 1:
+        problem = "one slice has no length that its time tells; a whole day has no times"
+        raise InputError(problem, element=lines[0].where)
+    length = begins[1] - begins[0]
     for index, line in enumerate(lines):
-        due = index * DAY / len(lines)
-        if line.has("time") and abs(line.time("time", 0.0) - due) > 1.0:
+        if length <= 0 or abs(begins[index] - begins[0] - index * length) > 1.0:
             raise InputError(
                 f"time {line['time']!r} is not that of slice {index + 1} of {len(lines)} equal "
-                "slices of a day",
+                f"slices of {length / 60.0:g} min from {lines[0]['time']} on",
                 element=line.where,
             )
-    return tuple(line.number("share") for line in lines)
+    end = begins[0] + len(lines) * length
+    if end > DAY + 1.0:
+        problem = f"{len(lines)} slices of {length / 60.0:g} min end after midnight"
+        raise InputError(problem, element=lines[-1].where)
+    if begins[0] == 0.0 and abs(end - DAY) <= 1.0:
+        return ProfileTable(shares, None, None)
+    return ProfileTable(shares, begins[0], end)
 
 
 def read_zones(text: str) -> dict[str, Rows[str]]:

@@ -10,7 +10,13 @@ import numpy as np
 from odscen.base.categories import Category
 from odscen.lanegraph.graphs import Relation
 from odscen.scenario.demand.day_profiles import curve
-from odscen.scenario.demand.trips import FIRST, Trips, drawn_categories, window
+from odscen.scenario.demand.trips import (
+    FIRST,
+    Trips,
+    drawn_categories,
+    poisson_number,
+    window,
+)
 from odscen.scenario.demand.zones import segments_of
 from odscen.scenario.document.distributions import stream
 
@@ -18,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from odscen.base.arrays import FloatArray, Int32Array
+    from odscen.scenario.demand.day_profiles import Curve
     from odscen.scenario.demand.zones import TripEnds
     from odscen.scenario.document.scenario_document import Scenario, VehicleInput
     from odscen.scenario.placing.region import Region
@@ -62,7 +69,9 @@ def entries(region: Region) -> tuple[Entry, ...]:
 
     A lane leads into the region where its node has no predecessor inside, and the lanes beside it
     have none there either: one that begins where the road widens is no entry. Junctions have none.
-    They are found once for all that ask for those of a region.
+    Where no lane leads into the region, as in a closed town, lanes that begin behind a junction
+    are entries, as of vehicles that come from the ground beside the road. They are found once for
+    all that ask for those of a region.
     """
     return region.remembered("entries", lambda: _find_entries(region))
 
@@ -71,7 +80,8 @@ def _find_entries(region: Region) -> tuple[Entry, ...]:
     graph = region.graph
     lanes, ids = graph.lanes, graph.segments.ids
     found: dict[tuple[int, bool], list[EntryLane]] = defaultdict(list)
-    for group in _first_nodes(region).values():
+    at_boundary = _first_nodes(region)
+    for group in (at_boundary or _first_nodes(region, behind_junctions=True)).values():
         for node in group:
             if _begin_alone(region, node, group):
                 row = int(lanes.lane[node])
@@ -103,15 +113,21 @@ def entry_lanes(part: VehicleInput, entry: Entry) -> tuple[EntryLane, ...]:
     return tuple(lane for lane in entry.lanes if lane.lane in part.lanes)
 
 
-def _first_nodes(region: Region) -> dict[tuple[int, bool], list[int]]:
+def _first_nodes(
+    region: Region, *, behind_junctions: bool = False
+) -> dict[tuple[int, bool], list[int]]:
     """Nodes outside junctions without predecessor inside, by section of a road and direction.
 
-    The key is the first row of the lanes of the section.
+    The key is the first row of the lanes of the section. ``behind_junctions`` are those whose
+    predecessors inside are in junctions.
     """
     lanes = region.graph.lanes
     inside = region.lanes
     led_to = np.zeros(len(inside), dtype=np.bool_)
     follows = (lanes.relation == Relation.SUCCESSOR) & inside[lanes.source]
+    if behind_junctions:
+        road = np.array([junction is None for junction in lanes.lanes.junctions], dtype=np.bool_)
+        follows &= road[lanes.lane[lanes.source]]
     led_to[lanes.target[follows]] = True
     sections: dict[tuple[str, int], int] = {}
     found: dict[tuple[int, bool], list[int]] = defaultdict(list)
@@ -157,6 +173,9 @@ def _lane_passes(region: Region, row: int, s: float, near: float) -> bool:
 SLICE = 900.0
 """Seconds of the slices in which the vehicles of ``per_hour`` are drawn."""
 
+PEAK_QUARTER = 1
+"""Of each hour of an input, counted from 0: the busiest one with a peak hour factor."""
+
 LEAST_HEADWAY = 0.8
 """Seconds between two vehicles on a lane at least; on a lane with more than 2,250 vehicles an hour
 half of their mean headway."""
@@ -183,9 +202,9 @@ class _InputGoals(NamedTuple):
 def input_trips(scenario: Scenario, ground: TripEnds, part: VehicleInput) -> Iterator[Trips]:
     """Yield the trips of an input, one for each slice of time.
 
-    In each slice as many vehicles come as it says (a fraction is a probability), on all lanes
-    alike, those of :data:`SLOW` on the outermost. Headways on a lane are exponential beyond
-    :data:`LEAST_HEADWAY`.
+    In each slice as many vehicles come as it says (a fraction is a probability), or with arrivals
+    at random as many as a Poisson distribution of that mean has; on all lanes alike, those of
+    :data:`SLOW` on the outermost. Headways on a lane are exponential beyond :data:`LEAST_HEADWAY`.
     """
     lanes = _depart_lanes(ground, part)
     for number, piece in enumerate(_slice_input(scenario, part)):
@@ -202,9 +221,20 @@ def _slice_input(scenario: Scenario, part: VehicleInput) -> Iterator[_Slice]:
         stop = start + length
         if not part.volumes:
             passed = day.amount(stop) - day.amount(start)
+            if part.peak_hour_factor is not None:
+                passed = _quarter_of_hour(day, begin, number, part.peak_hour_factor)
             yield _Slice(start, stop, (part.per_hour or 0.0) * passed / 3600.0)
         elif number < len(part.volumes):
             yield _Slice(start, stop, part.volumes[number])
+
+
+def _quarter_of_hour(day: Curve, begin: float, number: int, peak_hour_factor: float) -> float:
+    """Amount of a quarter: that of its hour, dealt out by the peak hour factor."""
+    hour, quarter = divmod(number, 4)
+    first = begin + hour * 4 * SLICE
+    whole = day.amount(first + 4 * SLICE) - day.amount(first)
+    busiest = 0.25 / peak_hour_factor
+    return whole * (busiest if quarter == PEAK_QUARTER else (1.0 - busiest) / 3.0)
 
 
 def _depart_lanes(ground: TripEnds, part: VehicleInput) -> dict[Category, Int32Array]:
@@ -235,7 +265,11 @@ def _draw_trips(
     *,
     name: str,
 ) -> Trips:
-    count = int(piece.number) + int(rng.random() < piece.number % 1.0)
+    uniform = float(rng.random())
+    if part.arrivals == "random":
+        count = poisson_number(uniform, piece.number)
+    else:
+        count = int(piece.number) + int(uniform < piece.number % 1.0)
     categories = drawn_categories(part.mix, rng.random(count))
     starts = _deal_starts(categories, lanes, rng)
     departs = _spread_departures(starts, piece, rng)

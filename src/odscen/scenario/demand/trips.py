@@ -4,9 +4,10 @@ Members of a matrix row, and of background traffic, are drawn from a stream of r
 by the scenario's seed and the row: adding rows, actors or flows changes nothing for the others, and
 more trips in a row leave its first ones as they were.
 
-When a trip begins is random; where it begins and ends in its zones is spread evenly
-(:class:`EvenShares`). A quarter of an hour has one or two trips of a row, and drawn each on its own
-they would lie on other roads with each seed, by more than the counts of these roads may be off.
+When a trip begins is random, and with arrivals at random the number of trips of a row, too. Where
+it begins and ends in its zones is spread evenly (:class:`EvenShares`): a quarter of an hour has one
+or two trips of a row, and drawn each on its own they would lie on other roads with each seed, by
+more than the counts of these roads may be off.
 
 Drawn for each trip by the seed and its id, so that other trips change nothing, but for one thing:
 where no place is left for a car to begin from, it begins elsewhere.
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.scenario.demand.day_profiles import curve
+from odscen.scenario.demand.expected_users import refuse_too_many
 from odscen.scenario.demand.zones import zone_segments
 from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.sampling_config import PlacingRules
@@ -332,9 +334,29 @@ def background_trips(
         day = curve(scenario.demand, background.profile)
         passed = day.amount(end) - day.amount(begin)
         number = standing * passed / usual_duration(ground, background.mix)
+        refuse_too_many({f"background traffic {background.id!r}": number})
     first = tuple(stream(scenario.seed, "places", background.id).random(3).tolist())
     even = EvenShares(first)
     yield _draw_trips(scenario, ground, background, rng, even, name=background.id, number=number)
+
+
+def poisson_number(uniform: float, mean: float) -> int:
+    """Number of a Poisson distribution that a share of it, from 0 to 1, lies at.
+
+    With the same share a larger mean has no smaller number: more trips leave the first ones be.
+    """
+    from scipy.special import pdtr, pdtrik
+
+    if mean <= 0.0:
+        return 0
+    # SciPy's inverse is of a continuous number of trips, and undefined at the smallest shares.
+    near = float(pdtrik(uniform, mean))
+    number = int(near) if near == near else 0
+    while pdtr(number, mean) < uniform:
+        number += 1
+    while number and pdtr(number - 1, mean) >= uniform:
+        number -= 1
+    return number
 
 
 def window(scenario: Scenario, part: Window) -> tuple[float, float]:
@@ -381,7 +403,11 @@ def _draw_trips(
     number: float,
     between: tuple[tuple[str, ...], tuple[str, ...]] | tuple[()] = (),
 ) -> Trips:
-    count = even.whole(number)
+    if part.arrivals == "random":
+        # A Poisson number of trips, each at a time of its own, is a Poisson process.
+        count = poisson_number(float(stream(scenario.seed, "arrivals", name).random()), number)
+    else:
+        count = even.whole(number)
     uniform = rng.random((count, 2))
     at_start, at_goal = even.places(count)
     begin, end = window(scenario, part)

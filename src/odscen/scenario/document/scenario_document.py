@@ -426,6 +426,11 @@ class Profile(Part):
         return self
 
     @property
+    def seconds(self) -> float:
+        """Of the part of the day that it describes; over these its mean is that of the demand."""
+        return 86_400.0 if self.begin is None or self.end is None else self.end - self.begin
+
+    @property
     def of_day(self) -> tuple[float, ...]:
         """Shares of equal slices of the whole day."""
         if self.begin is None or self.end is None:
@@ -443,13 +448,16 @@ class Profile(Part):
 class Window(Part):
     """Demand between two times; ``end`` ``None`` is the end of the run.
 
-    ``profile`` says when of that time it comes; without one it comes evenly.
+    ``profile`` says when of that time it comes; without one no time has more than another. With
+    ``arrivals`` ``random`` vehicles come as in a Poisson process, the number is that of the mean
+    over many seeds; with ``even`` as many come as are said, whatever the seed.
     """
 
     id: Identifier
     begin: Seconds = 0.0
     end: Seconds | None = None
     profile: Identifier | None = None
+    arrivals: Literal["even", "random"] = "even"
     mix: Mix = Field(default_factory=lambda: {Category.CAR: 1.0}, min_length=1)
 
 
@@ -507,6 +515,8 @@ class VehicleInput(Window):
     with growing s. ``per_hour`` are all lanes together, with a ``profile`` on average over a day;
     or ``volumes`` are counted vehicles of slices of ``interval`` seconds from ``begin`` on. ``to``
     are zones or segments with their shares; without it, each draws one of the ends of the region.
+    ``peak_hour_factor`` is the volume of an hour divided by four times that of its busiest quarter,
+    which is the second of each hour from ``begin`` on; the other three are alike.
     """
 
     segment: Label
@@ -515,6 +525,7 @@ class VehicleInput(Window):
     per_hour: Annotated[float, Field(gt=0, le=40_000)] | None = None
     volumes: Annotated[tuple[Number, ...], Field(max_length=10_000)] = ()
     interval: Annotated[float, Field(ge=1, le=86_400)] = 900.0
+    peak_hour_factor: Annotated[float, Field(ge=0.25, le=1)] | None = None
     to: Annotated[tuple[tuple[Label, Share], ...], Field(max_length=1000)] = ()
 
     @model_validator(mode="after")
@@ -525,6 +536,8 @@ class VehicleInput(Window):
             )
         if self.volumes and self.profile is not None:
             raise ValueError(f"volumes say when vehicles come; leave profile {self.profile!r} out")
+        if self.volumes and self.peak_hour_factor is not None:
+            raise ValueError("volumes say when vehicles come; leave peak_hour_factor out")
         return self
 
 

@@ -25,6 +25,7 @@ from odscen.scenario.document.scenario_document import (
     TransitStop,
     TripParking,
     VehicleInput,
+    Window,
     Zone,
 )
 from odscen.scenario.edits.edit_registry import (
@@ -102,10 +103,25 @@ def set_zone(
 
 @edit("Day profile {profile}")
 def set_profile(
-    scenario: Scenario, graph: MapGraph, *, profile: Identifier, shares: Sequence[float]
+    scenario: Scenario,
+    graph: MapGraph,
+    *,
+    profile: Identifier,
+    shares: Sequence[float],
+    begin: float | None = None,
+    end: float | None = None,
 ) -> Scenario:
-    """Give the scenario a day profile of its own; one of that name is replaced."""
-    part = validated(Profile, {"id": profile, "shares": tuple(shares)})
+    """Give the scenario a day profile of its own; one of that name is replaced.
+
+    Parameters
+    ----------
+    shares
+        Relative shares of equal slices of the time from ``begin`` to ``end``.
+    begin, end
+        Seconds after midnight, whole minutes; the whole day if not given.
+    """
+    fields = {"id": profile, "shares": tuple(shares), "begin": begin, "end": end}
+    part = validated(Profile, fields)
     return _check_demand(
         _change_demand(scenario, profiles=_put_part(scenario.demand.profiles, part)), graph
     )
@@ -230,6 +246,9 @@ def remove_demand(scenario: Scenario, graph: MapGraph, *, part: str) -> Scenario
     )
 
 
+_NEW: Mapping[str, Any] = MappingProxyType({"arrivals": "random"})
+"""Of inputs, trips and background traffic that are made new; documents without it are even."""
+
 _MODELS: Mapping[str, type[Zone | VehicleInput | Matrix]] = MappingProxyType(
     {"zones": Zone, "inputs": VehicleInput, "matrices": Matrix}
 )
@@ -262,7 +281,11 @@ def put_parts(
     for name, fields in parts.items():
         index = index_of_part.get(name, len(changed))
         old = changed[index] if index < len(changed) else None
-        kept = {} if old is None else {field: getattr(old, field) for field in model.model_fields}
+        kept: dict[str, Any] = {}
+        if old is not None:
+            kept = {field: getattr(old, field) for field in model.model_fields}
+        elif kind != "zones":
+            kept = dict(_NEW)
         if kind == "inputs" and {"per_hour", "volumes"} & fields.keys():
             kept |= {"per_hour": None, "volumes": ()}
         with _add_place_to_error(f"demand.{kind}[{index}]", when=len(parts) > 1):
@@ -290,7 +313,11 @@ def _change_or_make_part(
 ) -> _Part:
     """Part of that name with some fields changed, or a new one."""
     old = next((known_part for known_part in ones if known_part.id == name), None)
-    kept = {} if old is None else {field: getattr(old, field) for field in model.model_fields}
+    kept: dict[str, Any] = {}
+    if old is not None:
+        kept = {field: getattr(old, field) for field in model.model_fields}
+    elif issubclass(model, Window):
+        kept = dict(_NEW)
     return validated(model, {**kept, **fields, "id": name})
 
 

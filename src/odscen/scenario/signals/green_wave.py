@@ -23,6 +23,10 @@ Favoured = Literal["both", "out", "back"]
 
 _NEAR = 1e-6
 
+LEAST_BAND = 5.0
+"""Seconds of a band that is worth it: two vehicles follow each other through it, at 2 s each after
+the first one has reacted."""
+
 
 class GreenWindow(NamedTuple):
     """Seconds of a program at which green begins, and for which it lasts."""
@@ -100,8 +104,8 @@ def widest_offsets(
     Parameters
     ----------
     favoured
-        ``both``: the narrower band is made as wide as can be, then the sum; otherwise the band of
-        that direction, then the other.
+        ``both``: the narrower band is made as wide as can be, then the sum, and where not both get
+        :data:`LEAST_BAND`, the wider one; otherwise the band of that direction, then the other.
     """
     grid = max(math.floor(cycle + _NEAR), 1)
     steps: FloatArray = np.arange(2 * grid, dtype=np.float64)
@@ -138,7 +142,10 @@ def _value_of_bands(out: float, back: float, favoured: Favoured) -> tuple[float,
         return round(out, 6), round(back, 6)
     if favoured == "back":
         return round(back, 6), round(out, 6)
-    return round(min(out, back), 6), round(out + back, 6)
+    # Two bands that nearly no vehicle fits into are worth less than one that some do.
+    wide = [band if band >= LEAST_BAND else 0.0 for band in (out, back)]
+    narrow = (min(out, back) + 0.5 * (out + back)) * 1e-6
+    return round(min(wide), 6), round(sum(wide) + narrow, 6)
 
 
 def _green_left(windows: Sequence[GreenWindow], times: FloatArray, cycle: float) -> FloatArray:

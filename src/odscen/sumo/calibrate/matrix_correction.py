@@ -392,7 +392,7 @@ def _with_trips(scenario: Scenario, cells: Sequence[MatrixCell], trips: FloatArr
         matrices += [
             Matrix(
                 id=f"{matrix.id}-{number}", begin=when[0], end=when[1], mix=matrix.mix,
-                trips=tuple(own),
+                arrivals=matrix.arrivals, trips=tuple(own),
             )
             for number, (when, own) in enumerate(sorted(rows[index].items()), start=1)
         ]  # fmt: skip

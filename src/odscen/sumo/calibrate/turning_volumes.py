@@ -19,6 +19,8 @@ from odscen.sumo.realize.route_planner import NoRouteError, RoutePlanner
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    import polars as pl
+
     from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.sumo_map import SumoMap
@@ -91,6 +93,43 @@ def planned_vehicles(scenario: Scenario, sumo_map: SumoMap) -> Iterator[PlannedV
         passed = tuple(turn for step in steps if (turn := Turn(*step)) in known)
         if passed:
             yield PlannedVehicle(user.depart, user.category, passed)
+
+
+def driven_vehicles(
+    trajectories: pl.LazyFrame, sumo_map: SumoMap, categories: Mapping[str, Category]
+) -> Iterator[PlannedVehicle]:
+    """Yield each passage of a light in a run as a vehicle of its own, at the time of it.
+
+    Parameters
+    ----------
+    trajectories
+        As the run wrote them, of every step, with lanes.
+    categories
+        Of the road users of the run; those who are not in it are left out.
+    """
+    import polars as pl
+
+    known = {turn for light in sumo_map.lights for turn in turns_of(light, sumo_map)}
+    edges = {edge for turn in known for edge in turn}
+    lanes = [(name, lane.edge) for name, lane in sumo_map.net.lanes.items() if lane.edge in edges]
+    table = pl.DataFrame(lanes, schema={"lane": pl.String, "edge": pl.String}, orient="row")
+    steps = (
+        trajectories.select(
+            time=pl.col("timestep_time"),
+            id=pl.col("vehicle_id").cast(pl.String),
+            lane=pl.col("vehicle_lane").cast(pl.String),
+        )
+        .join(table.lazy(), on="lane", how="inner")
+        .sort("id", "time")
+        .with_columns(before=pl.col("edge").shift(1).over("id"))
+        .filter(pl.col("before").is_not_null() & (pl.col("before") != pl.col("edge")))
+        .select("id", "time", "before", "edge")
+        .collect()
+    )
+    for name, time, before, edge in steps.iter_rows():
+        turn = Turn(before, edge)
+        if turn in known and name in categories:
+            yield PlannedVehicle(time, categories[name], (turn,))
 
 
 def turns_of(light: SumoLight, sumo_map: SumoMap) -> dict[Turn, tuple[int, ...]]:

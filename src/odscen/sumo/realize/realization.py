@@ -30,6 +30,7 @@ from odscen.runs.layout import (
 from odscen.runs.recording import region_xml
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.checks.signal_checks import signal_problems
+from odscen.scenario.demand.expected_users import expected_users, refuse_too_many
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.rules_document import appearing_actors
 from odscen.scenario.document.scenario_document import TripParking
@@ -336,7 +337,10 @@ def all_road_users(
     ------
     ScenarioError
         With every actor and flow whose spawn or goal is not usable.
+    LimitError
+        If there are more than a run may have; they are counted before they are made.
     """
+    refuse_too_many(expected_users(scenario, until=until))
     users = road_users(scenario, sumo_map.graph, region, until=until)
     if scenario.transit.lines:
         users = _in_order((*users, *line_users(scenario, region, until=until)))
