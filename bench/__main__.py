@@ -14,6 +14,7 @@ ALL = (
     "startup",
     "lane_graph",
     "maps_add",
+    "map_refusals",
     "netconvert_maps",
     "capacity",
     "saturation",

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bench.fuzz.batches import try_batch
 from bench.fuzz.damage import changes_for, damaged
-from bench.fuzz.limits import Ended
+from bench.fuzz.limits import Ended, Limits
 from bench.fuzz.map_damage import MAP
+from bench.fuzz.material import Material
+from bench.fuzz.results import wrong_in_document
+from bench.fuzz.trials import Trial, trial_rng
 from bench.fuzz.verdicts import Verdict, judge, left_over, listing
+from odscen.base.errors import InputError
+from tests.experiments.study_case import SCENARIO
 from tests.opendrive.full import FULL
 
 FILES = {
@@ -69,3 +77,66 @@ def test_a_refused_command_leaves_everything_as_it_was(tmp_path: Path) -> None:
     assert left_over(before, listing([tmp_path]), refused=True) == f"left {tmp_path / 'half'}"
     (tmp_path / ".building-x").mkdir()
     assert left_over(before, listing([tmp_path]), refused=False).endswith(".building-x")
+
+
+def test_a_batch_finds_what_its_trials_find_alone(tmp_path: Path) -> None:
+    """Trials of one target in one process end as they do one by one."""
+    limits = Limits()
+    material = Material(tmp_path / "material", ())
+
+    def trial(one: Trial) -> str:
+        if one.rng.random() < 0.5:
+            given = ("--workspace", str(tmp_path))
+            one.command("check", str(one.folder / "nowhere.scenario.json"), *given)
+        else:
+            one.ask("what is wrong", lambda: "nothing is right")
+        return "made up"
+
+    seeds = range(1, 9)
+    alone = Trial(material, limits, tmp_path / "batch", 1, trial_rng("t", 1))
+    alone.folder.mkdir()
+    batch = try_batch(alone, "t", trial, seeds)
+    found = []
+    for seed in seeds:
+        folder = tmp_path / f"alone-{seed}"
+        folder.mkdir()
+        each = Trial(material, limits, folder, seed, trial_rng("t", seed))
+        trial(each)
+        found.append(each.finding.verdict)
+    assert [one.finding.verdict for one in batch] == found
+    assert set(found) == {Verdict.REFUSED, Verdict.WRONG}
+
+
+def test_a_batch_that_dies_is_a_find_of_the_trial_in_which_it_died(tmp_path: Path) -> None:
+    def trial(one: Trial) -> str:
+        if one.seed == 3:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return "made up"
+
+    alone = Trial(Material(tmp_path, ()), Limits(), tmp_path / "batch", 1, trial_rng("t", 1))
+    alone.folder.mkdir()
+    verdicts = {one.seed: one.finding.verdict for one in try_batch(alone, "t", trial, range(1, 6))}
+    assert verdicts == {1: Verdict.FINE, 2: Verdict.FINE, 3: Verdict.CRASH}
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ('{"seed": 3, "seed": 4}', "twice"),
+        ('{"seed": "3"}', None),
+    ],
+)
+def test_what_a_document_says_is_held_against_what_was_read(
+    tmp_path: Path, given: str, words: str | None
+) -> None:
+    data = json.loads(SCENARIO.read_text(encoding="utf-8"))
+    file = tmp_path / "a.scenario.json"
+    file.write_text(json.dumps(data), encoding="utf-8")
+    assert wrong_in_document(file) == ""
+    data.pop("seed")
+    file.write_text(given[:-1] + "," + json.dumps(data)[1:], encoding="utf-8")
+    if words is None:
+        with pytest.raises(InputError, match="seed"):
+            wrong_in_document(file)
+    else:
+        assert words in wrong_in_document(file)

@@ -9,30 +9,44 @@ import json
 import os
 import pkgutil
 import shutil
+import signal
 import sys
 import tempfile
 import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import odscen
 from bench.common import OUT
+from bench.fuzz.batches import BATCH, BATCHED, try_batch
+from bench.fuzz.byte_targets import BYTE_TARGETS
+from bench.fuzz.edit_targets import edit_trial
 from bench.fuzz.fault_targets import FAULT_TARGETS
 from bench.fuzz.file_targets import FILE_TARGETS
 from bench.fuzz.folder_targets import FOLDER_TARGETS
+from bench.fuzz.handed_targets import HANDED_TARGETS
 from bench.fuzz.limits import Limits
 from bench.fuzz.material import Material, prepare
+from bench.fuzz.process_targets import PROCESS_TARGETS
 from bench.fuzz.request_targets import handmade_trial, schema_trial
 from bench.fuzz.served import Served
+from bench.fuzz.state_targets import STATE_TARGETS
 from bench.fuzz.trials import Trial, trial_rng
 from bench.fuzz.verdicts import Finding, Tried, Verdict
 
 MINUTES = 60.0
+ALONE = 6
+"""One turn of so many of a target that has batches is a trial alone."""
+PROGRESS = 300.0
 KEPT = OUT / "fuzz"
-REQUESTS = {"requests by hand": (handmade_trial, 1.0), "requests by schema": (schema_trial, 1.0)}
+REQUESTS = {
+    "edits": (edit_trial, 3.0),
+    "requests by hand": (handmade_trial, 1.5),
+    "requests by schema": (schema_trial, 1.5),
+}
 _SKIPPED_IMPORTS = ("odscen.__main__", "odscen.carla", "odscen.sumo.worker.simulation.session")
 """What a command imports only in a process of its own."""
 
@@ -50,6 +64,10 @@ class Bench:
             **FILE_TARGETS,
             **FOLDER_TARGETS,
             **FAULT_TARGETS,
+            **HANDED_TARGETS,
+            **STATE_TARGETS,
+            **PROCESS_TARGETS,
+            **BYTE_TARGETS,
         }
         for name, (target, share) in REQUESTS.items():
             targets[name] = (self._with_server(target), share)
@@ -81,7 +99,9 @@ class Bench:
             kind = "not made"
             words = traceback.format_exc().strip().splitlines()[-1]
             trial.findings.append(Finding(Verdict.WRONG, f"the bench itself: {words}"))
-        tried = Tried(target, seed, kind, trial.finding, time.perf_counter() - begin, trial.peak)
+        took = time.perf_counter() - begin
+        counts = dict(trial.counts)
+        tried = Tried(target, seed, kind, trial.finding, took, trial.peak, counts)
         self.limits.clean(0.0)
         if tried.finding.verdict.failed:
             keep(folder, tried)
@@ -92,6 +112,23 @@ class Bench:
         """End what was started, and remove what was made."""
         self.served.stop()
         shutil.rmtree(self.root, ignore_errors=True)
+
+    def attempt_batch(self, target: str, seeds: Sequence[int]) -> list[Tried]:
+        """Make trials in one process; what fails is tried again alone."""
+        folder = self.root / "trial"
+        folder.mkdir()
+        alone = Trial(self.material, self.limits, folder, seeds[0], trial_rng(target, seeds[0]))
+        tried = try_batch(alone, target, self.targets[target][0], seeds)
+        self.limits.clean(0.0)
+        shutil.rmtree(folder, ignore_errors=True)
+        found = []
+        for one in tried:
+            again = self.attempt(target, one.seed) if one.finding.verdict.failed else one
+            if one.finding.verdict.failed and not again.finding.verdict.failed:
+                words = f"in a batch only: {one.finding.words}"
+                again = replace(one, finding=Finding(one.finding.verdict, words))
+            found.append(again)
+        return found
 
 
 def keep(folder: Path, tried: Tried) -> None:
@@ -122,6 +159,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     options = _options(sys.argv[1:] if argv is None else argv)
     root = Path(tempfile.mkdtemp(prefix="odscen-fuzz-"))
     bench = Bench(root)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends with what it has started
     try:
         bench.prepare()
         begin = time.perf_counter()
@@ -166,19 +204,31 @@ def _many(
     spent = dict.fromkeys(chosen, 0.0)
     seeds = dict.fromkeys(chosen, options.first)
     tried: list[Tried] = []
+    turns: Counter[str] = Counter()
+    told = begin
     while time.perf_counter() - begin < options.minutes * 60.0:
         target = min(chosen, key=lambda name: (spent[name] / bench.targets[name][1], name))
         start = time.perf_counter()
-        one = bench.attempt(target, seeds[target])
+        turns[target] += 1
+        if target in BATCHED and turns[target] % ALONE:
+            mine = range(seeds[target], seeds[target] + BATCH)
+            found = bench.attempt_batch(target, mine)
+        else:
+            mine = range(seeds[target], seeds[target] + 1)
+            found = [bench.attempt(target, seeds[target])]
         spent[target] += time.perf_counter() - start
-        seeds[target] += 1
-        tried.append(one)
-        if one.finding.verdict.failed:
-            print(
-                f"{one.finding.verdict} --target {target!r} --seed {one.seed}: {one.kind}: "
-                f"{one.finding.words}".encode("utf-8", "backslashreplace").decode(),
-                flush=True,
-            )
+        seeds[target] = mine.stop
+        tried += found
+        for one in found:
+            if one.finding.verdict.failed:
+                print(
+                    f"{one.finding.verdict} --target {target!r} --seed {one.seed}: {one.kind}: "
+                    f"{one.finding.words}".encode("utf-8", "backslashreplace").decode(),
+                    flush=True,
+                )
+        if time.perf_counter() - told > PROGRESS:
+            told = time.perf_counter()
+            print(f"{(told - begin) / 60.0:.0f} minutes: {len(tried):,} trials", flush=True)
     return tried
 
 
@@ -199,17 +249,27 @@ def table(tried: Sequence[Tried], seconds: float) -> str:
     ]
     verdicts = Counter(one.finding.verdict for one in tried if one.finding.verdict.failed)
     lines.append(
-        f"{seconds / 60.0:.1f} minutes; "
+        f"{seconds / 60.0:.1f} minutes, {_processor_minutes():.1f} of one processor; "
         + (
             ", ".join(f"{number} {verdict}" for verdict, number in sorted(verdicts.items()))
             or "nothing failed"
         )
     )
+    counted: Counter[str] = Counter()
+    for one in tried:
+        counted.update(one.counts)
+    lines += [f"{what}: {number:,}" for what, number in sorted(counted.items())]
     skipped = {one.finding.words for one in tried if one.finding.verdict is Verdict.SKIPPED}
     lines += [f"skipped: {words}" for words in sorted(skipped)]
     if verdicts:
         lines.append(f"folders of the failures: {os.path.relpath(KEPT)}")
     return "\n".join(lines)
+
+
+def _processor_minutes() -> float:
+    """What this process and those that it has waited for have computed."""
+    spent = os.times()
+    return (spent.user + spent.system + spent.children_user + spent.children_system) / 60.0
 
 
 def _row(name: str, own: Sequence[Tried]) -> tuple[str, ...]:

@@ -319,7 +319,7 @@ def _no_handles(trial: Trial) -> str:
 
 
 FAULT_TARGETS: dict[str, tuple[Callable[[Trial], str], float]] = {
-    "disks": (disks, 0.8),
-    "kills": (kills, 1.5),
-    "starts": (starts, 0.7),
+    "disks": (disks, 0.3),
+    "kills": (kills, 0.3),
+    "starts": (starts, 0.2),
 }

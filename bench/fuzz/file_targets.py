@@ -11,6 +11,7 @@ from pathlib import Path
 from bench.fuzz.damage import CSV, JSON, TOML, damaged, pick
 from bench.fuzz.map_damage import MAP, XML
 from bench.fuzz.material import CROSSING, Material
+from bench.fuzz.results import wrong_in_document, wrong_in_imported_table, wrong_in_map
 from bench.fuzz.trials import Target, Trial
 
 
@@ -22,7 +23,13 @@ def maps(trial: Trial) -> str:
     used = trial.used()
     other = ["--converter", "netconvert"] if trial.rng.random() < 0.08 else []
     ended = trial.command("maps", "add", str(file), *other, *used)
-    if ended.code == 0 and trial.rng.random() < 0.4:
+    if ended.code == 0:
+        folder = Path(used[1]) / "maps" / "damaged"
+        trial.ask("built map", lambda: wrong_in_map(folder))
+        said = trial.command("maps", "verify", "damaged", *used)
+        if said.code == 1 and "maps verify" not in ended.err + ended.out:
+            trial.wrong("maps verify fails, and maps add has not said so")
+    if ended.code == 0 and trial.rng.random() < 0.3:
         _use_map(trial, used)
     return f"{source.stem}: {damage.kind}"
 
@@ -30,7 +37,6 @@ def maps(trial: Trial) -> str:
 def _use_map(trial: Trial, used: list[str]) -> None:
     """All that one does with a map."""
     made = trial.folder / "made"
-    trial.command("maps", "verify", "damaged", *used)
     trial.command("maps", "show", "damaged", "--json", *used)
     ended = trial.command(
         "generate",
@@ -45,7 +51,8 @@ def _use_map(trial: Trial, used: list[str]) -> None:
         *used,
     )
     for scenario in made.glob("*.scenario.json") if ended.code == 0 else ():
-        trial.command("check", str(scenario), *used)
+        if trial.command("check", str(scenario), *used).code == 1:
+            trial.wrong("a scenario that was sampled has errors")
         trial.run(scenario, used)
 
 
@@ -124,7 +131,9 @@ def scenarios(trial: Trial) -> str:
     file.write_bytes(damage.data)
     used = trial.used("maps")
     ended = trial.command("check", str(file), *used)
-    if ended.code == 0 and trial.rng.random() < 0.5:
+    if ended.code == 0:
+        trial.ask("what was read", lambda: wrong_in_document(file))
+    if ended.code == 0 and trial.rng.random() < 0.3:
         trial.run(file, used)
     elif trial.rng.random() < 0.3:
         out = str(trial.folder / "exported")
@@ -155,7 +164,8 @@ def graph_forms(trial: Trial) -> str:
     damage = damaged(_graphml(trial.material).read_bytes(), trial.rng, XML)
     file = trial.folder / "damaged.graphml"
     file.write_bytes(damage.data)
-    trial.command("check", str(file), *trial.used("maps"))
+    if trial.command("check", str(file), *trial.used("maps")).code == 0:
+        trial.ask("what was read", lambda: wrong_in_document(file))
     return damage.kind
 
 
@@ -185,8 +195,9 @@ def tables(trial: Trial) -> str:
         writes=[scenario.parent],
     )
     if ended.code == 0:
+        trial.ask("imported", lambda: wrong_in_imported_table(option, file, scenario))
         trial.command("check", str(scenario), *used)
-        if trial.rng.random() < 0.3:
+        if trial.rng.random() < 0.15:
             trial.run(scenario, used)
     return f"{option}: {damage.kind}"
 
@@ -236,13 +247,13 @@ def configs(trial: Trial) -> str:
 
 
 FILE_TARGETS: dict[str, tuple[Target, float]] = {
-    "config": (configs, 0.8),
-    "graph form": (graph_forms, 0.5),
-    "lights": (lights, 0.7),
-    "map": (maps, 3.0),
-    "network": (networks, 0.8),
-    "odd file": (map_files, 0.3),
-    "scenario": (scenarios, 1.2),
-    "tables": (tables, 0.7),
+    "config": (configs, 1.0),
+    "graph form": (graph_forms, 0.6),
+    "lights": (lights, 0.8),
+    "map": (maps, 2.0),
+    "network": (networks, 0.4),
+    "odd file": (map_files, 0.2),
+    "scenario": (scenarios, 2.5),
+    "tables": (tables, 1.5),
 }
 """Trials by name, each with its share of the time."""

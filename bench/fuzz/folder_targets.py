@@ -232,9 +232,9 @@ def options(trial: Trial) -> str:
 
 
 FOLDER_TARGETS: dict[str, tuple[Target, float]] = {
-    "assets": (assets, 0.4),
-    "interrupted run": (interrupted, 1.0),
-    "map folder": (map_folders, 1.0),
+    "assets": (assets, 0.5),
+    "interrupted run": (interrupted, 0.4),
+    "map folder": (map_folders, 0.4),
     "options": (options, 0.7),
     "run folder": (run_folders, 1.2),
     "suite": (suites, 0.6),

@@ -15,7 +15,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +31,8 @@ GRACE = 3.0
 """Seconds in which processes that a command has started may end after it."""
 TRACEBACK = 70
 """Exit code of a command that raised anything but one of our errors."""
+WRONG_RESULT = 71
+"""Exit code of a question whose answer is that a result is wrong."""
 _SUBREAPER = 36
 _DROP_FOR_GOOD = 24
 _CAPABILITIES_VERSION = 0x20080522
@@ -78,13 +80,24 @@ class Limits:
         whole: bool = False,
         plain: bool = False,
         environment: Mapping[str, str] | None = None,
+        question: Callable[[], str] | None = None,
+        before: Callable[[], None] | None = None,
     ) -> int:
-        """Start ``odscen ARGV`` in ``folder/cwd``; output goes to ``folder``; its process id."""
+        """Start ``odscen ARGV`` in ``folder/cwd``; output goes to ``folder``; its process id.
+
+        Parameters
+        ----------
+        question
+            Asked instead of the command: what is wrong with a result, in words; none if nothing is.
+        before
+            Called in the new process, after its output goes to the folder.
+        """
         for name in ("cwd", "tmp"):
             (folder / name).mkdir(parents=True, exist_ok=True)
         pid = os.fork()
         if pid == 0:
-            _child(tuple(argv), folder, whole, plain, dict(environment or {}))
+            call = question and (lambda: _answer(question))
+            _child(tuple(argv), folder, whole, plain, dict(environment or {}), call, before)
         return pid
 
     def run(
@@ -120,7 +133,7 @@ class Limits:
                 _, status = os.waitpid(pid, 0)
                 break
             time.sleep(pause)
-            pause = min(pause * 1.5, 0.1)
+            pause = min(pause * 1.5, 0.03)
         took = time.perf_counter() - begin
         orphans = self.clean(GRACE if not (hung or large) else 0.0) if clean else ()
         return Ended(
@@ -178,7 +191,13 @@ def kill_tree(pid: int) -> None:
 
 
 def _child(
-    argv: tuple[str, ...], folder: Path, whole: bool, plain: bool, more: Mapping[str, str]
+    argv: tuple[str, ...],
+    folder: Path,
+    whole: bool,
+    plain: bool,
+    more: Mapping[str, str],
+    call: Callable[[], int] | None,
+    before: Callable[[], None] | None,
 ) -> None:
     """What the fork does; it never returns."""
     code = TRACEBACK
@@ -186,9 +205,11 @@ def _child(
         _settle(folder, more)
         if plain:
             _give_up_rights()
+        if before is not None:
+            before()
         if whole:
             os.execv(sys.executable, [sys.executable, "-m", "odscen", *argv])
-        code = _call(argv)
+        code = call_command(argv) if call is None else call()
     except BaseException:
         traceback.print_exc()
     finally:
@@ -239,7 +260,8 @@ def _give_up_rights() -> None:
     libc.capset(header, sets)
 
 
-def _call(argv: tuple[str, ...]) -> int:
+def call_command(argv: tuple[str, ...]) -> int:
+    """Call a command in this process; its exit code."""
     from odscen.cli import main
 
     sys.argv = ["odscen", *argv]
@@ -250,6 +272,12 @@ def _call(argv: tuple[str, ...]) -> int:
     except KeyboardInterrupt:
         return 130
     return 0
+
+
+def _answer(question: Callable[[], str]) -> int:
+    words = question()
+    sys.stderr.write(words)
+    return WRONG_RESULT if words else 0
 
 
 def high_water_of_tree(pid: int) -> int:

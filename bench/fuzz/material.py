@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import json
+import re
 import shutil
 import time
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,6 +109,7 @@ def prepare(root: Path, limits: Limits) -> Material:
     _ok(limits, root, "maps", "network", CROSSING, "--out", str(root / "net.net.xml"), *used)
     (root / "config.toml").write_text(CONFIG, encoding="utf-8")
     _runs(material, limits, sampled)
+    _handed(material, limits, sampled)
     return material
 
 
@@ -150,6 +154,107 @@ def _runs(material: Material, limits: Limits, sampled: Path) -> None:
     shutil.copy(sampled, suite / "one.scenario.json")
     (suite / "suite.toml").write_text(SUITE, encoding="utf-8")
     _ok(limits, root, "test", str(suite / "suite.toml"), "--update-baseline", *used)
+
+
+def _handed(material: Material, limits: Limits, sampled: Path) -> None:
+    """What others hand over: scenes with a catalog, a feed, plans; and folders of experiments."""
+    root, used = material.root, ["--workspace", str(material.workspace)]
+    for source in (sampled, material.scenario):
+        for version in ("1.0", "1.3"):
+            out = root / f"exported-{source.name.partition('.')[0]}-{version}"
+            given = ("--to", "openscenario", "--version", version, "--out", str(out))
+            _ok(limits, root, "export", str(source), *given, *used)
+    scenes = root / "osc"
+    (scenes / "own").mkdir(parents=True)
+    for number, file in enumerate(sorted(root.glob("exported-*/*.xosc"))):
+        shutil.copy(file, scenes / f"exported-{number}.xosc")
+        for beside in file.parent.glob("*.xodr"):
+            shutil.copy(beside, scenes)
+    write_scenes(scenes)
+    turned = json.loads(sampled.read_text(encoding="utf-8"))
+    turned |= {
+        "parameters": {
+            "gap": {"value": 10.0, "min": 0.0, "max": 100.0},
+            "speed": {"value": 10.0, "min": 1.0, "max": 20.0},
+        },
+        "flows": [{"id": "f", "spawn": turned["actors"][7]["spawn"], "per_hour": "20 * $gap"}],
+        "simulation": {"duration": 4.0},
+    }
+    turned["actors"] = turned["actors"][:4]
+    turned["actors"][0]["speed"] = "$speed"
+    (root / "turned.scenario.json").write_text(json.dumps(turned), encoding="utf-8")
+    buses = turned | {"name": "buses", "parameters": {}, "flows": [], "demand": {"clock": 25200.0}}
+    buses["actors"] = []
+    buses["simulation"] = {"duration": 3600.0}
+    (root / "buses.scenario.json").write_text(json.dumps(buses), encoding="utf-8")
+    (root / "study.toml").write_text(STUDY, encoding="utf-8")
+    (root / "dataset.toml").write_text(DATASET, encoding="utf-8")
+    ended = limits.run(("feed",), root, question=lambda: write_feed(material))
+    if ended.code:
+        raise RuntimeError(f"the feed cannot be made: {ended.err}")
+    folders, turned_file = root / "folders", str(root / "turned.scenario.json")
+    swept = ["sweep", turned_file, "--vary", "gap=6,20", "--out", str(folders / "sweep")]
+    _ok(limits, root, *swept, *used)
+    _ok(
+        limits,
+        root,
+        "study",
+        "run",
+        str(root / "study.toml"),
+        "--out",
+        str(folders / "study"),
+        *used,
+    )
+    _ok(
+        limits,
+        root,
+        "dataset",
+        str(root / "dataset.toml"),
+        "--out",
+        str(folders / "dataset"),
+        *used,
+    )
+    suite, results = str(root / "suite" / "suite.toml"), folders / "suite" / "results.json"
+    results.parent.mkdir()
+    _ok(limits, root, "test", suite, "--results", str(results), *used)
+
+
+def write_scenes(folder: Path) -> None:
+    """A cut-in with conditions of many kinds, and one whose manoeuvre is in a catalog."""
+    from tests.app.test_scenario_imports import FILE, ROAD, SPEED
+
+    (folder / "road.xodr").write_text(ROAD, encoding="utf-8")
+    scene = FILE.replace("ACTION", SPEED)
+    (folder / "scene.xosc").write_text(scene, encoding="utf-8")
+    entry = SPEED.replace('value="5"', 'value="$mps"').replace('value="2"', 'value="$kph"')
+    event = f'<Event name="later"><Action name="y"><PrivateAction>{entry}</PrivateAction></Action>'
+    (folder / "own" / "moves.xosc").write_text(
+        '<OpenSCENARIO><FileHeader revMajor="1" revMinor="2"/><Catalog name="moves">'
+        '<Maneuver name="faster"><ParameterDeclarations><ParameterDeclaration name="mps" '
+        f'parameterType="double" value="1"/></ParameterDeclarations>{event}</Event></Maneuver>'
+        "</Catalog></OpenSCENARIO>",
+        encoding="utf-8",
+    )
+    reference = (
+        '<CatalogReference catalogName="moves" entryName="faster"><ParameterAssignments>'
+        '<ParameterAssignment parameterRef="mps" value="${$kph / 4}"/></ParameterAssignments>'
+        "</CatalogReference>"
+    )
+    places = '<CatalogLocations><ManeuverCatalog><Directory path="own"/></ManeuverCatalog>'
+    text = re.sub(r"<Maneuver name.*</Maneuver>", reference, scene, flags=re.DOTALL)
+    text = text.replace("<RoadNetwork>", f"{places}</CatalogLocations><RoadNetwork>")
+    (folder / "referring.xosc").write_text(text, encoding="utf-8")
+
+
+def write_feed(material: Material) -> str:
+    """The tables of a feed with two stops beside lanes of the crossing."""
+    from odscen.maps.store import Workspace
+    from tests.app.demand.test_transit_feeds import feed
+
+    archive = feed(Workspace.open(material.workspace), material.root)
+    with zipfile.ZipFile(archive) as tables:
+        tables.extractall(material.root)
+    return ""
 
 
 def _wait_for(slices: Path, pid: int) -> None:
@@ -204,6 +309,32 @@ expect = ["arrived >= 0 %"]
 
 [tolerance]
 mean_delay = "10 % or 2 s"
+"""
+STUDY = """name = "rain"
+scenarios = ["turned.scenario.json"]
+seeds = 2
+[[variant]]
+name = "hard-rain"
+edits = [{kind = "set_environment", preset = "HardRainNoon"}]
+[[vary]]
+parameter = "gap"
+values = [6, 8]
+[run]
+until = 3
+"""
+DATASET = """name = "two"
+licence = "CC-BY-4.0"
+formats = ["pyg", "scenarionet"]
+keep_if = ["planned >= 1"]
+shard = 2
+[splits]
+train = ["signal*"]
+[[study.sample]]
+maps = ["signal*"]
+count = 2
+fill = 0.1
+[study.run]
+until = 3
 """
 CONFIG = """fill = 0.2
 pedestrian_share = 0.1

@@ -35,7 +35,7 @@ def schema_trial(trial: Trial, served: Served) -> str:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of schemathesis itself
         _drawn(trial, served, path, method)
-    _settle(trial, served, f"{method} {path}")
+    settle(trial, served, f"{method} {path}")
     return f"{method} {path}"
 
 
@@ -108,7 +108,7 @@ def _answered(trial: Trial, status: int, where: str) -> None:
         trial.findings.append(Finding(verdict, f"{status} {where}"[:200]))
 
 
-def _settle(trial: Trial, served: Served, where: str) -> None:
+def settle(trial: Trial, served: Served, where: str) -> None:
     """What the server wrote of itself, its memory, and whether it still answers."""
     said = served.said()
     if "Traceback (most recent call last)" in said:
@@ -120,10 +120,10 @@ def _settle(trial: Trial, served: Served, where: str) -> None:
         trial.findings.insert(0, Finding(Verdict.MEMORY, words))
         served.stop()
     else:
-        _ask(trial, served, "GET", "/api/health")
+        ask(trial, served, "GET", "/api/health")
 
 
-def _ask(
+def ask(
     trial: Trial,
     served: Served,
     method: str,
@@ -162,7 +162,7 @@ def handmade_trial(trial: Trial, served: Served) -> str:
     served.ready()
     kind = pick(trial.rng, sorted(_BY_HAND))
     _BY_HAND[kind](trial, served)
-    _settle(trial, served, kind)
+    settle(trial, served, kind)
     return kind
 
 
@@ -182,17 +182,17 @@ def _upload(trial: Trial, served: Served) -> None:
     if what == "map":
         content = damaged(pick(rng, material.map_files).read_bytes(), rng, MAP).data
         body, headers = _form("file", name, content)
-        said = _ask(trial, served, "POST", "/api/maps", body, headers)
+        said = ask(trial, served, "POST", "/api/maps", body, headers)
         _await(trial, served, said)
     elif what == "scenario":
         content = damaged(material.scenario.read_bytes(), rng, JSON).data
-        _ask(trial, served, "POST", "/api/scenarios/upload", *_form("file", name, content))
+        ask(trial, served, "POST", "/api/scenarios/upload", *_form("file", name, content))
     else:
         table = pick(rng, ("od", "counts", "zones", "profile"))
         content = damaged(material.file(f"{table}.csv").read_bytes(), rng, CSV).data
         body, headers = _form("file", name, content)
         target = f"/api/scenarios/done/demand/table?version=0&table={table}&id=a"
-        _ask(trial, served, "POST", target, body, headers)
+        ask(trial, served, "POST", target, body, headers)
 
 
 def _await(trial: Trial, served: Served, said: bytes) -> None:
@@ -204,7 +204,7 @@ def _await(trial: Trial, served: Served, said: bytes) -> None:
     end = time.monotonic() + SECONDS * busy()
     while time.monotonic() < end:
         try:
-            state = json.loads(_ask(trial, served, "GET", f"/api/jobs/{name}"))["state"]
+            state = json.loads(ask(trial, served, "GET", f"/api/jobs/{name}"))["state"]
         except (ValueError, KeyError, TypeError):
             return
         if state in ("done", "failed", "cancelled"):
@@ -233,7 +233,7 @@ def _body(trial: Trial, served: Served) -> None:
     for _ in range(int(pick(trial.rng, (1, 2)))):
         change = json_value if trial.rng.random() < 0.7 else pick(trial.rng, list(JSON.values()))
         content = change(content, trial.rng)
-    _ask(trial, served, method, target, content, {"Content-Type": "application/json"})
+    ask(trial, served, method, target, content, {"Content-Type": "application/json"})
 
 
 def _names(trial: Trial, served: Served) -> None:
@@ -242,7 +242,7 @@ def _names(trial: Trial, served: Served) -> None:
     for key in ("name", "run", "job"):
         path = path.replace("{" + key + "}", quote(word, safe="%", errors="replace"))
     query = pick(trial.rng, ("", "?", "?from=" + "9" * 400, "?start=nan&end=inf&n=-1", "?a[]=%ff"))
-    _ask(trial, served, method.upper(), path + query)
+    ask(trial, served, method.upper(), path + query)
 
 
 _HEADERS = (

@@ -14,7 +14,7 @@ from bench.fuzz.material import Material
 
 _URL = re.compile(r"http://127\.0\.0\.1:(\d+)/\S*")
 START = 60.0
-TRIALS = 40
+TRIALS = 200
 """Trials with one server; what they uploaded and deleted goes with it."""
 
 
@@ -51,7 +51,7 @@ class Served:
         shutil.copytree(self.material.workspace, self.folder / "workspace")
         scenarios = self.folder / "workspace" / "scenarios"
         scenarios.mkdir(exist_ok=True)
-        for name in ("done.scenario.json", "full.scenario.json"):
+        for name in ("done.scenario.json", "full.scenario.json", "turned.scenario.json"):
             shutil.copy(self.material.file(name), scenarios)
         argv = [
             "serve",

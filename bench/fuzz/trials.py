@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from bench.fuzz.damage import Generator
 from bench.fuzz.limits import Ended, Limits
 from bench.fuzz.material import Material
+from bench.fuzz.results import wrong_in_run
 from bench.fuzz.verdicts import Finding, Verdict, judge, left_over, listing, worst
 
 WHOLE = 20
@@ -30,6 +32,7 @@ class Trial:
     rng: Generator
     findings: list[Finding] = field(default_factory=list)
     peak: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
 
     def command(
         self,
@@ -57,9 +60,17 @@ class Trial:
         self.findings.append(finding)
         return ended
 
-    def run(self, scenario: Path, used: Sequence[str]) -> None:
-        """Run a scenario for a few seconds."""
-        self.command(
+    def ask(self, about: str, question: Callable[[], str]) -> Ended:
+        """Ask a process of its own what is wrong with a result; the words are the find."""
+        ended = self.limits.run((about,), self.folder, question=question)
+        self.peak = max(self.peak, ended.peak)
+        self.findings.append(judge(ended))
+        return ended
+
+    def run(self, scenario: Path, used: Sequence[str], *more: str) -> Ended:
+        """Run a scenario for a few seconds, and look at what it has recorded."""
+        out = self.folder / "workspace" / "runs"
+        ended = self.command(
             "run",
             str(scenario),
             "--until",
@@ -67,9 +78,18 @@ class Trial:
             "--time-limit",
             SUMO_LIMIT,
             "--out",
-            str(self.folder / "workspace" / "runs"),
+            str(out),
+            *more,
             *used,
         )
+        for run in sorted(out.glob("*")) if ended.code == 0 else ():
+            if (run / "summary.json").exists() and run.name not in ("done", "sliced"):
+                self.ask("result of run", lambda run=run: wrong_in_run(run))
+        return ended
+
+    def wrong(self, words: str) -> None:
+        """Add a find: a result that is not what it should be."""
+        self.findings.append(Finding(Verdict.WRONG, words))
 
     @property
     def finding(self) -> Finding:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
-from bench.fuzz.limits import Ended
+from bench.fuzz.limits import WRONG_RESULT, Ended
 
 FINE_CODES = (0, 1)
 REFUSED_CODES = (2, 3)
@@ -62,6 +62,7 @@ class Tried:
     finding: Finding
     seconds: float
     peak: int = 0
+    counts: dict[str, int] = field(default_factory=dict)
 
 
 def judge(ended: Ended) -> Finding:
@@ -75,6 +76,8 @@ def judge(ended: Ended) -> Finding:
         return Finding(Verdict.MEMORY, f"{named} ({ended.peak / 1e9:.2f} GB)")
     if "Traceback (most recent call last)" in err:
         return Finding(Verdict.TRACEBACK, named)
+    if ended.code == WRONG_RESULT:
+        return Finding(Verdict.WRONG, f"{named[:100]}: {err[:400]}")
     if ended.code not in (*FINE_CODES, *REFUSED_CODES):
         return Finding(Verdict.CRASH, f"{named} (exit code {ended.code})")
     if ended.orphans:

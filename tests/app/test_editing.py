@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 
 import pytest
@@ -188,3 +189,23 @@ def test_an_index_without_edits_opens_as_one_of_earlier_versions_does(tmp_path: 
     assert history is not None
     assert open_history(history, "{}") is history
     assert folder.edits(history.current) == ()
+
+
+def test_a_history_of_others_names_no_file_outside_and_unpacks_to_no_more_than_a_document(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, precious = HistoryFolder(tmp_path / "history"), tmp_path / "precious"
+    precious.write_text("of others", encoding="utf-8")
+    history = folder.add(folder.begin("{}", label="Open"), '{"a": 1}', label="Edit")
+    index = folder.folder / "index.json"
+    index.write_text(index.read_text().replace(history.entries[1].file, "../precious"))
+    assert folder.read() is None
+    index.write_text(index.read_text().replace("../precious", str(precious)))
+    assert folder.read() is None
+    assert precious.read_text(encoding="utf-8") == "of others"
+    packed = folder.folder / history.entries[0].file
+    monkeypatch.setattr("odscen.app.editing._MOST_BYTES", 1000)
+    for content in (zlib.compress(bytes(10_000)), b"no archive", b"", zlib.compress(b"\xff")):
+        packed.write_bytes(content)
+        with pytest.raises(InputError, match="this step of the history is damaged"):
+            folder.document(history.entries[0])

@@ -204,6 +204,28 @@ def test_what_is_changed_in_the_file_holds_and_not_the_property(tmp_path: Path) 
     assert changed["actors", "ego", "initial_speed"] == "12.5"
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [("goal", "", "goal: String should have at least 1"), ("spawn", "[1]", "spawn: Input should")],
+)
+def test_properties_that_no_actor_can_have_refuse_their_road_user(
+    tmp_path: Path, name: str, value: str, words: str
+) -> None:
+    entry("motorway_weave")
+    before = template_scenario(workspace(), "cut-in", "motorway_weave")
+    export(workspace(), before, tmp_path, to="openscenario", options={"version": "1.2"})
+    (file,) = tmp_path.glob("*.xosc")
+    tree = etree.parse(file)
+    (van,) = (one for one in before.actors if not one.ego)
+    path = f'.//ScenarioObject[@name="{van.id}"]//Property[@name="odscen.{name}"]'
+    (property_,) = tree.findall(path)
+    property_.set("value", value)
+    tree.write(file)
+    found = import_file(workspace(), file)
+    assert [one.id for one in found.scenario.actors] == [one.id for one in before.actors if one.ego]
+    assert any(words in row.reason for row in found.lists["refused"])
+
+
 def wholly_taken() -> list[Path]:
     files = sorted((SHARED / "osc").rglob("*.xosc")) if (SHARED / "osc").is_dir() else []
     return [one for one in files if "atalog" not in str(one)]

@@ -88,6 +88,10 @@ def test_a_variant_that_cannot_be_names_the_edit_and_writes_nothing(
     assert "this is not JSON" in refused(file)
     file.write_text('[{"kind": "set_seed", "sed": 3}]')
     assert "edits.json: edits[0]" in refused(file)
+    file.write_text('[{"kind": {"a": 1}, "seed": 3}]')
+    assert "is none of" in refused(file)
+    file.write_text(json.dumps([{"kind": "set_seed", "seed": n} for n in range(1001)]))
+    assert "this has 1,001 edits; the limit is 1,000" in refused(file)
 
 
 @pytest.mark.slow

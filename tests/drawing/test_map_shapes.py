@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 import shapely
 
-from odscen.drawing.map_drawing import BRIDGE
+from odscen.drawing.map_drawing import BRIDGE, MapDrawing
 from odscen.drawing.map_shapes import map_drawing
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
+from tests.convert.legs import OPPOSITE, entry, junction, leg, way
 from tests.drawing import maps
+from tests.opendrive.snippets import document
 
 
 def draw(text, **options):
@@ -230,3 +232,44 @@ def test_real_towns_are_drawn_small_and_the_same_every_time(shared_maps):
     assert first == draw(text).to_json()
     assert len(first) < 2_500_000
     assert {area.level for area in draw(text).areas} == {0, 1}
+
+
+LINKED = '<link><predecessor id="-1"/><successor id="1"/></link>'
+
+
+def painted_way(name: str, kind: str) -> str:
+    mark = f'<roadMark sOffset="0" type="{kind}" width="0.12" laneChange="none"/>'
+    return way(name, links=LINKED + mark)
+
+
+def painted_crossing(kind: str) -> MapDrawing:
+    """Four legs with straight ways of 20 m, each with a mark on its right border."""
+    text = document(
+        *(leg(name) for name in OPPOSITE),
+        *(painted_way(name, kind) for name in OPPOSITE),
+        junction(*(entry(name) for name in OPPOSITE)),
+    )
+    odr = parse(text)
+    return map_drawing(odr, RoadTable.of(odr))
+
+
+def painted_metres(drawing: MapDrawing) -> float:
+    return sum(
+        float(np.hypot(*np.diff(line, axis=0).T).sum())
+        for mark in drawing.marks
+        for line in mark.lines.each
+    )
+
+
+def test_solid_lines_of_connecting_roads_end_where_others_cross_them() -> None:
+    drawing = painted_crossing("solid")
+    for mark in drawing.marks:
+        for line in mark.lines.each:
+            # All ways are 3.5 m wide, right of the axes: within 3.5 m of both all is crossed.
+            assert np.abs(line).max(axis=1).min() >= 3.5 - 0.2
+    # Each way has its line on 6.65 m before and behind what the ways across it take.
+    assert painted_metres(drawing) == pytest.approx(4 * 2 * (10.0 - 3.5 + 0.15), abs=0.05)
+
+
+def test_broken_lines_guide_drivers_over_a_junction() -> None:
+    assert painted_metres(painted_crossing("broken")) == pytest.approx(4 * 20.0, abs=0.05)

@@ -19,12 +19,12 @@ def stored_files(folder: Path, *, leave: Collection[str] = ()) -> list[str]:
 
 
 @contextmanager
-def changed_byte(file: Path, *, share: float) -> Iterator[None]:
-    """Change the byte at a share of a file's length, 0 is the first; then put it back."""
+def changed_byte(file: Path, *, share: float, bit: int = 0x01) -> Iterator[None]:
+    """Change a bit of the byte at a share of a file's length, 0 is the first; then put it back."""
     content = file.read_bytes()
     place = min(int(share * len(content)), len(content) - 1)
     changed = bytearray(content)
-    changed[place] ^= 0x01
+    changed[place] ^= bit
     file.unlink()  # the network of a run is a link to the map's
     file.write_bytes(changed)
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -12,6 +13,7 @@ from odscen.app.running.runs import run
 from odscen.base.errors import InputError
 from odscen.experiments.compare import compare
 from odscen.experiments.datasets import make_dataset
+from odscen.experiments.measure import FigureKey
 from odscen.experiments.studies import (
     begin_study,
     carry_out_study,
@@ -19,6 +21,8 @@ from odscen.experiments.studies import (
     study_results,
     study_state,
 )
+from odscen.experiments.suite import CaseResult, SeedResult
+from odscen.experiments.suite_runs import read_parts, results_json
 from odscen.experiments.sweeps import SweepSettings, opened_case, read_sweep, read_table, sweep
 from odscen.runs.finished_run import Run
 from odscen.runs.run_settings import RunSettings
@@ -51,17 +55,30 @@ def unnoticed(
     for number, name in enumerate(stored_files(folder, leave=leave)):
         share = SHARES[number % len(SHARES)]
         for place_in_file in {share, 1.0}:
-            with changed_byte(folder / name, share=place_in_file):
-                for reader, read in readers.items():
-                    if not read_by(reader, name):
-                        continue
-                    try:
-                        read()
-                    except InputError:
-                        continue
-                    found.append((reader, name, place_in_file))
+            # The lowest bit leaves text what it is, the highest one makes it none.
+            for bit in (0x01, 0x80):
+                with changed_byte(folder / name, share=place_in_file, bit=bit):
+                    found += _unnoticed_by(readers, name, place_in_file, read_by)
     for read in readers.values():  # all is as it was
         read()
+    return found
+
+
+def _unnoticed_by(
+    readers: Mapping[str, Callable[[], Any]],
+    name: str,
+    place_in_file: float,
+    read_by: Callable[[str, str], bool],
+) -> list[tuple[str, str, float]]:
+    found = []
+    for reader, read in readers.items():
+        if not read_by(reader, name):
+            continue
+        try:
+            read()
+        except InputError:
+            continue
+        found.append((reader, name, place_in_file))
     return found
 
 
@@ -159,3 +176,24 @@ def test_what_a_run_of_a_dataset_was_exported_to_is_read_as_it_was_written(tmp_p
     (index.parent / "SHA256SUMS").unlink()
     with pytest.raises(InputError, match="which is no plain value"):
         make_dataset(place(), asked, tmp_path, MadeUpExports(), beside=tmp_path)
+
+
+def test_of_results_of_a_suite(tmp_path: Path) -> None:
+    """They are written by one job and judged by another."""
+    file = tmp_path / "results.json"
+    run_of_seed = SeedResult(1, 0.5, None, (), {FigureKey("run", "", "mean_delay"): 12.5})
+    case: Any = SimpleNamespace(name="crossing")
+    made: Any = SimpleNamespace(
+        suite=SimpleNamespace(name="all"),
+        cases=(CaseResult(case, (run_of_seed,), made_of={"odscen": "0.2.0"}),),
+    )
+    file.write_text(results_json(made, beside=tmp_path), encoding="utf-8")
+    assert not unnoticed(tmp_path, {"merge": lambda: read_parts([tmp_path])})
+    content = file.read_bytes()
+    for place_in_file in range(len(content)):
+        for bit in (0x01, 0x80):
+            changed = bytearray(content)
+            changed[place_in_file] ^= bit
+            file.write_bytes(changed)
+            with pytest.raises(InputError):
+                read_parts([file])

@@ -158,6 +158,8 @@ def test_names_that_could_be_paths_are_refused(name):
 def test_odd_file_names_become_plain_map_names():
     assert name_from_file(Path("/x/My town (new).xodr")) == "My_town_new"
     assert name_from_file(Path("---.xodr")) == "map"
+    assert name_from_file(Path("Town.osm.bz2")) == name_from_file(Path("Town.osm.pbf")) == "Town"
+    assert name_from_file(Path("Town.v2.gz")) == "Town.v2"
 
 
 def test_a_file_that_is_not_there_says_so(workspace):

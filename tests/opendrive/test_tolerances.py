@@ -247,13 +247,21 @@ def test_a_link_to_something_that_is_neither_road_nor_junction_is_left_out(kind:
     assert note.endswith("is neither road nor junction; the link is left out [dangling-link]")
 
 
-def test_lane_layers_are_refused_by_their_name() -> None:
-    layers = f'<laneLayer id="0">{LANES}</laneLayer>'
+def test_the_only_lane_layer_of_a_road_holds() -> None:
+    layer = f'<laneLayer id="0"><laneOffset s="0" a="1" b="0" c="0" d="0"/>{LANES}</laneLayer>'
+    odr = parse(document(road(lanes=layer), version="1.9"))
+    plain = f'<laneOffset s="0" a="1" b="0" c="0" d="0"/>{LANES}'
+    assert odr.roads == parse(document(road(lanes=plain))).roads
+    assert odr.notes[-1].endswith("the only lane layer, as OpenDRIVE 1.9 has them, holds [version]")
+
+
+def test_several_lane_layers_are_refused_as_which_holds_is_not_clear() -> None:
+    layers = "".join(f'<laneLayer id="{number}">{LANES}</laneLayer>' for number in (0, 1))
     with pytest.raises(OpenDriveError) as caught:
         parse(document(road(lanes=layers), version="1.9"))
     assert str(caught.value) == (
-        "road 1: the lanes are in <laneLayer> elements: lane layers, as OpenDRIVE 1.9 has them, "
-        "are not supported; save the map as 1.8 or older"
+        "road 1: the lanes are in several <laneLayer> elements: which of the lane layers of "
+        "OpenDRIVE 1.9 traffic keeps to is not clear; save the map with one, or as 1.8 or older"
     )
 
 

@@ -94,3 +94,23 @@ def test_health_is_answered_while_a_scenario_is_checked(
         healthy.set()
         asking.join()
     assert statuses == [200]
+
+
+def test_edits_of_one_request_have_so_much_time_and_are_made_all_or_none(
+    client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each looks at the whole document: of closures 5,000 took three minutes."""
+    before = client.get(f"/api/scenarios/{sampled}").json()
+    place = before["document"]["roi"][0]
+    closures = [{"kind": "closure", "id": f"m{n}", "places": [place]} for n in range(400)]
+    edits = [{"kind": "set_measure", "measure": measure} for measure in closures]
+    body = {"version": before["version"], "edits": edits}
+    monkeypatch.setattr("odscen.web.routes.scenario_routes._EDIT_SECONDS", 0.01)
+    answer = client.post(f"/api/scenarios/{sampled}/edits", json=body)
+    assert answer.status_code == 422
+    assert "these 400 edits take longer than 0.01 s" in answer.json()["error"]["message"]
+    assert client.get(f"/api/scenarios/{sampled}").json() == before
+    monkeypatch.undo()
+    answer = client.post(f"/api/scenarios/{sampled}/edits", json=body)
+    assert answer.status_code == 200
+    assert len(answer.json()["document"]["measures"]) == 400

@@ -9,6 +9,7 @@ such.
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import zlib
 from contextlib import suppress
@@ -45,6 +46,9 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
 _INDEX = "index.json"
+_FILE = re.compile(r"[0-9]{8,}\.json\.z")
+"""Names of files of a history."""
+_MOST_BYTES = 1 << 28
 _LOCK_PATIENCE = 30.0
 """Wall seconds to wait until another process has written a scenario of the workspace."""
 
@@ -66,6 +70,9 @@ class HistoryFolder:
         try:
             data = json.loads((self.folder / _INDEX).read_text(encoding="utf-8"))
             entries = tuple(HistoryEntry(**entry) for entry in data["entries"])
+            # Of a workspace that others hand over: what is not in this folder is not of it.
+            if not all(_FILE.fullmatch(entry.file) for entry in entries):
+                return None
             history = History(int(data["version"]), str(data["sha256"]), entries, data["position"])
             return history if 0 <= history.position < len(entries) else None
         except (OSError, ValueError, KeyError, TypeError):
@@ -122,8 +129,22 @@ class HistoryFolder:
         write_text(self.folder / _INDEX, json.dumps(asdict(history)))
 
     def document(self, entry: HistoryEntry) -> str:
-        """Read the document of an entry."""
-        return zlib.decompress((self.folder / entry.file).read_bytes()).decode()
+        """Read the document of an entry.
+
+        Raises
+        ------
+        InputError
+            If it is not as it was written, or much longer than a document can be.
+        """
+        file = self.folder / entry.file
+        try:
+            unpacking = zlib.decompressobj()
+            content = unpacking.decompress(file.read_bytes(), _MOST_BYTES)
+            if unpacking.eof:
+                return content.decode()
+        except (OSError, zlib.error, UnicodeDecodeError):
+            pass
+        raise InputError("this step of the history is damaged, and cannot be shown", file=str(file))
 
     def edits(self, entry: HistoryEntry) -> tuple[dict[str, Any], ...]:
         """Read the edits by name that have made a document; none if it was made otherwise."""

@@ -63,6 +63,11 @@ def read_edits(path: Path) -> list[EditBase]:
         raise InputError(f"this is not JSON: {error}", file=str(path)) from error
     with in_file(str(path)):
         ones = data if isinstance(data, list) else [data]
+        if len(ones) > MOST_EDITS:
+            raise InputError(
+                f"this has {len(ones):,} edits; the limit is {MOST_EDITS:,}. Make a variant of the "
+                "variant, or edit from Python"
+            )
         return [_read_edit(one, place=f"edits[{index}]") for index, one in enumerate(ones)]
 
 
@@ -130,6 +135,10 @@ def make_variant(
         edits=tuple(base.data for base in ones),
     )
     return new.model_copy(update={"variant": variant})
+
+
+MOST_EDITS = 1000
+"""In a file. Each edit looks at the whole document: the work is that of edits times parts."""
 
 
 def edited(scenario: Scenario, edits: Iterable[EditBase], loaded: LoadedMap) -> Scenario:

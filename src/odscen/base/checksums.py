@@ -211,8 +211,12 @@ def check_files(
 
 def seal(data: Mapping[str, Any], *, indent: int | None = None) -> str:
     """JSON of an object with its own SHA-256 as its last field."""
-    head = json.dumps(data, indent=indent, ensure_ascii=False).removesuffix("}").rstrip("\n")
-    head += f",\n{' ' * (indent or 0)}{_SEAL}"
+    return seal_text(json.dumps(data, indent=indent, ensure_ascii=False), indent=indent or 0)
+
+
+def seal_text(text: str, *, indent: int = 0) -> str:
+    """The JSON text of an object that has fields, with its own SHA-256 as its last one."""
+    head = text.rstrip().removesuffix("}").rstrip("\n") + f",\n{' ' * indent}{_SEAL}"
     return f'{head}{digest(head.encode())}"\n}}\n'
 
 

@@ -149,7 +149,7 @@ def _write_results(
         before = ""
         # GitHub shows what all commands of a step have added to this file.
         if str(summary) == os.environ.get("GITHUB_STEP_SUMMARY") and summary.is_file():
-            before = summary.read_text(encoding="utf-8")
+            before = summary.read_text(encoding="utf-8", errors="replace")
         write_text(summary, before + suite_summary(result))
 
 

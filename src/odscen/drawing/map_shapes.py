@@ -6,6 +6,7 @@ is neither gap nor overlap. Roads that pass over others are drawn a level up.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,8 @@ from odscen.drawing.map_drawing import BRIDGE, Area, Lines, MapDrawing, Mark
 from odscen.opendrive.road_model import DRIVABLE_TYPES
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from odscen.base.arrays import BoolArray
@@ -31,6 +34,12 @@ _DASH_FAST = (6.0, 12.0)
 
 _UNPAINTED = frozenset({"none", "grass", ""})
 
+INSIDE = 0.15
+"""Metres that a line lies inside the border of another lane, at least, to be painted over it."""
+
+LEAST_PIECE = 1.0
+"""Metres of a line that is left, at least."""
+
 
 class _Stroke(NamedTuple):
     """One painted line: a stretch of a border, shifted sideways, in a style."""
@@ -43,8 +52,14 @@ class _Stroke(NamedTuple):
     style: tuple[str, float, tuple[float, float] | None]
 
 
-def road_marks(borders: Borders, levels: IntArray, tolerance: float) -> tuple[Mark, ...]:
-    """All painted markings, grouped by style; ``levels`` per section, ``tolerance`` in metres."""
+def road_marks(
+    borders: Borders, levels: IntArray, tolerance: float, grounds: Sequence[JunctionGround] = ()
+) -> tuple[Mark, ...]:
+    """All painted markings, grouped by style; ``levels`` per section, ``tolerance`` in metres.
+
+    Solid lines of connecting roads end where other connecting roads begin (``grounds``): there the
+    ground of a junction is bare, and only broken lines guide drivers over it.
+    """
     strokes = _list_strokes(borders.sections)
     if not strokes:
         return ()
@@ -67,6 +82,10 @@ def road_marks(borders: Borders, levels: IntArray, tolerance: float) -> tuple[Ma
     level = levels[section]
     kept = np.flatnonzero(sizes >= 2)
     thin = thinned(exact.take(kept), tolerance)
+    if grounds:
+        solid = np.array([strokes[stroke].style[2] is None for stroke in kept.tolist()])
+        thin, pieces = _clear_grounds(thin, section[kept], solid, borders.sections.road, grounds)
+        kept = kept[pieces]
     groups: dict[tuple[int, str, float, tuple[float, float]], list[int]] = {}
     for line, stroke in enumerate(kept.tolist()):
         color, width, dash = strokes[stroke].style
@@ -77,6 +96,65 @@ def road_marks(borders: Borders, levels: IntArray, tolerance: float) -> tuple[Ma
         for style in sorted(groups)
         for at, color, width, dash in [style]
     )
+
+
+class JunctionGround(NamedTuple):
+    """Lanes for vehicles of the connecting roads of one junction on the ground.
+
+    ``rings`` are their outlines, ``road`` the row of each one's road.
+    """
+
+    rings: Lines
+    road: IntArray
+
+
+def _clear_grounds(
+    lines: Lines,
+    section: IntArray,
+    solid: BoolArray,
+    roads: IntArray,
+    grounds: Sequence[JunctionGround],
+) -> tuple[Lines, IntArray]:
+    """Cut solid lines of connecting roads where they run over other roads of their junction.
+
+    Parameters
+    ----------
+    section
+        Of each line.
+    solid
+        Of each line.
+    roads
+        Road of each section.
+
+    Returns
+    -------
+    tuple
+        The lines, or their pieces, and the line that each piece is of.
+    """
+    import shapely
+
+    shapes = [lines.xy[a:b] for a, b in pairwise(lines.start.tolist())]
+    pieces: dict[int, list[FloatArray]] = {n: [shape] for n, shape in enumerate(shapes)}
+    own_road = roads[section]
+    for ground in grounds:
+        members = np.flatnonzero(solid & np.isin(own_road, ground.road))
+        if not len(members):
+            continue
+        index = np.repeat(np.arange(ground.rings.total), np.diff(ground.rings.start))
+        outlines = shapely.linearrings(ground.rings.xy, indices=index)
+        lanes = shapely.buffer(shapely.make_valid(shapely.polygons(outlines)), -INSIDE)
+        painted = np.array([shapely.linestrings(shapes[n]) for n in members])
+        line, lane = shapely.STRtree(lanes).query(painted, predicate="intersects")
+        other = ground.road[lane] != own_road[members[line]]
+        for k in np.unique(line[other]).tolist():
+            over = shapely.union_all(lanes[lane[other & (line == k)]])
+            rest = shapely.get_parts(shapely.difference(painted[k], over))
+            rest = rest[shapely.length(rest) >= LEAST_PIECE]
+            pieces[int(members[k])] = [shapely.get_coordinates(part) for part in rest]
+    order = [(n, part) for n, parts in pieces.items() for part in parts]
+    sizes = np.array([len(part) for _, part in order], dtype=np.int64)
+    xy = np.concatenate([part for _, part in order]) if order else np.empty((0, 2))
+    return Lines(xy, offsets(sizes)), np.array([n for n, _ in order], dtype=np.int64)
 
 
 def _list_strokes(sections: Sections) -> list[_Stroke]:
@@ -221,13 +299,15 @@ def map_drawing(
     borders = evaluate_borders(odr, table)
     thin = thinned(borders.lines, tolerance)
     levels = _section_levels(borders, table)
-    areas = _build_areas(thin, borders, table, levels, _junction_of_lanes(odr, table))
+    junction = _junction_of_lanes(odr, table)
+    areas = _build_areas(thin, borders, table, levels, junction)
+    grounds = _junction_grounds(thin, borders, table, levels, junction)
     sides = _bridge_sides(thin, borders, table, levels)
     drawing = MapDrawing(
         name=name,
         bounds=_bounds_of([area.rings for area in areas]),
         areas=areas,
-        marks=(*sides, *road_marks(borders, levels, tolerance)),
+        marks=(*sides, *road_marks(borders, levels, tolerance, grounds)),
     )
     return add_furniture(drawing, odr, table)
 
@@ -238,12 +318,9 @@ def _bounds_of(parts: list[Lines]) -> Bounds:
     return (low[0], low[1], high[0], high[1])
 
 
-def _build_areas(
-    thin: Lines, borders: Borders, table: RoadTable, levels: IntArray, junction: IntArray
-) -> tuple[Area, ...]:
+def _lane_rings(thin: Lines, borders: Borders, table: RoadTable) -> Lines:
+    """Outline of each lane."""
     lanes = len(table.lane_keys)
-    if lanes == 0:
-        return ()
     outer, ids = np.arange(lanes), np.asarray(table.lane_id)
     inner = inner_rows(table, lanes, borders.section[:lanes])
     # Counter-clockwise: out along the right border, back along the left one.
@@ -252,9 +329,36 @@ def _build_areas(
     first = np.stack([thin.start[:-1][ahead], thin.start[1:][back] - 1], axis=1).ravel()
     counts = np.stack([sizes[ahead], sizes[back]], axis=1).ravel()
     steps = np.tile(np.array([1, -1], dtype=np.int64), lanes)
-    rings = Lines(
+    return Lines(
         thin.xy[ranges(first, counts, step=steps)], offsets(counts.reshape(-1, 2).sum(axis=1))
     )
+
+
+def _junction_grounds(
+    thin: Lines, borders: Borders, table: RoadTable, levels: IntArray, junction: IntArray
+) -> list[JunctionGround]:
+    """Lanes for vehicles of each junction's connecting roads on the ground."""
+    lanes = len(table.lane_keys)
+    if not (junction >= 0).any():
+        return []
+    rings = _lane_rings(thin, borders, table)
+    drivable = np.array([kind in DRIVABLE_TYPES for kind in table.lane_type], dtype=np.bool_)
+    usable = drivable & (np.abs(_ring_areas(rings)) > 0.01) & (levels[borders.section[:lanes]] == 0)
+    roads = np.asarray(table.lane_road)
+    return [
+        JunctionGround(rings.take(rows), roads[rows])
+        for number in np.unique(junction[usable & (junction >= 0)]).tolist()
+        for rows in [np.flatnonzero(usable & (junction == number))]
+    ]
+
+
+def _build_areas(
+    thin: Lines, borders: Borders, table: RoadTable, levels: IntArray, junction: IntArray
+) -> tuple[Area, ...]:
+    lanes = len(table.lane_keys)
+    if lanes == 0:
+        return ()
+    rings = _lane_rings(thin, borders, table)
     solid = np.abs(_ring_areas(rings)) > 0.01
     kinds = np.array([AREA_KINDS.get(kind, "other") for kind in table.lane_type])
     drawn = solid & (np.array(table.lane_type) != "none")

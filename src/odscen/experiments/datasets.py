@@ -454,7 +454,7 @@ def _begin_dataset(out: Path, plan: DatasetPlan) -> None:
     text = json.dumps(plan.model_dump(mode="json"), indent=1, ensure_ascii=False) + "\n"
     file = out / PLAN_FILE
     if file.is_file():
-        if file.read_text(encoding="utf-8") != text:
+        if file.read_bytes() != text.encode():
             raise ConflictError(f"{out} holds a dataset of another plan; name another folder")
         return
     out.mkdir(parents=True, exist_ok=True)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.app.running.runs import check_run
 from odscen.app.scenarios import read_scenario
+from odscen.base.checksums import seal_text, unsealed
 from odscen.base.errors import InputError, ToolError, in_file
 from odscen.base.given_files import read_given
 from odscen.base.stored_files import documents, read_document
@@ -352,7 +353,7 @@ def _seed_result(
 
 
 RESULTS_FORMAT = "odscen-suite-results"
-RESULTS_VERSION = 1
+RESULTS_VERSION = 2
 RESULTS_FILE = "results.json"
 """Name of such files in a folder that is to be merged."""
 
@@ -382,9 +383,10 @@ class RunCase:
 
 
 def results_json(result: SuiteResult, *, beside: Path) -> str:
-    """Text of the file; folders of runs are relative to ``beside``, where it will lie."""
+    """Text of the file with its seal; folders of runs are relative to ``beside``, where it lies."""
     head = {"format": RESULTS_FORMAT, "version": RESULTS_VERSION, "suite": result.suite.name}
-    return json_with_rows(head, "scenarios", (_case_row(case, beside) for case in result.cases))
+    rows = (_case_row(case, beside) for case in result.cases)
+    return seal_text(json_with_rows(head, "scenarios", rows), indent=2)
 
 
 def _case_row(case: CaseResult, beside: Path) -> dict[str, Any]:
@@ -422,16 +424,19 @@ def read_parts(paths: Iterable[Path]) -> dict[str, RunCase]:
     ------
     InputError
         If a file is none of ours, a folder has none, or two have the same scenario.
+    DamagedError
+        If a file is not as it was written.
     """
     found: dict[str, RunCase] = {}
     for file in [file for path in paths for file in _results_files(path)]:
         with in_file(str(file)):
-            data = read_document(
+            read_document(
                 read_given(file),
                 form=RESULTS_FORMAT,
                 version=RESULTS_VERSION,
                 what="results of a suite",
             )
+            data = unsealed(file)
             with documents("results of a suite"):
                 cases = [_read_case(row, file) for row in data["scenarios"]]
             for case in cases:

@@ -180,7 +180,7 @@ def begin_folder(
     files[SCENARIO_FILE] = dumps(scenario)
     there = {name: out / name for name in files if (out / name).is_file()}
     for name, file in there.items():
-        if file.read_text(encoding="utf-8") != files[name]:
+        if file.read_bytes() != files[name].encode():
             raise ConflictError(f"{out} holds another {what} ({name} differs); name another folder")
     if there and (out / SUMS_FILE).is_file():
         check_files(out, may_miss=(TABLE_FILE, PAGE_FILE, ARCHIVE_FILE))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -115,10 +116,21 @@ class _FeedRow(dict[str, str]):
         return InputError(f"{shown(self[column])} {why}", file=self._file, element=place)
 
     def number(self, column: str) -> float:
+        text = self[column]
         try:
-            return float(self[column])
+            value = float(text) if "_" not in text else math.nan  # Python's own 1_000
         except ValueError:
-            raise self.refusal(column, "is not a number") from None
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.refusal(column, "is not a number")
+        return value
+
+    def degrees(self, column: str, most: float) -> float:
+        """Degrees from ``-most`` to ``most``."""
+        value = self.number(column)
+        if abs(value) > most:
+            raise self.refusal(column, f"is not between -{most:g} and {most:g} degrees")
+        return value
 
 
 def _read_rows(tables: Mapping[str, str], file: str, *needed: str) -> Iterator[_FeedRow]:
@@ -179,8 +191,8 @@ def _read_stops(tables: Mapping[str, str]) -> dict[str, FeedStop]:
         row["stop_id"]: FeedStop(
             row["stop_id"],
             row.get("stop_name", "").strip(),
-            row.number("stop_lat"),
-            row.number("stop_lon"),
+            row.degrees("stop_lat", 90.0),
+            row.degrees("stop_lon", 180.0),
         )
         for row in _read_rows(tables, "stops.txt", "stop_id", "stop_lat", "stop_lon")
         if row["stop_lat"].strip() and row["stop_lon"].strip()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from itertools import pairwise
@@ -143,11 +144,13 @@ def _find_stop_nodes(
     x, y = project(np.array([stop.lon for stop in stops]), np.array([stop.lat for stop in stops]))
     found: dict[str, int] = {}
     for stop, east, north in zip(stops, x.tolist(), y.tolist(), strict=True):
+        if not (math.isfinite(east) and math.isfinite(north)):
+            continue  # so far away that the projection has no place for it
         dx, dy = east - lanes.x[nodes], north - lanes.y[nodes]
         hdg = lanes.hdg[nodes]
         aside = (np.cos(hdg) * dy - np.sin(hdg) * dx) * right[nodes]
         distance = np.where(aside >= -BESIDE, np.hypot(dx, dy), np.inf)
-        if np.isfinite(east) and distance.min() <= within:
+        if distance.min() <= within:
             found[stop.id] = int(nodes[int(np.argmin(distance))])
     return found
 

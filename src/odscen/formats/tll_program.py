@@ -77,6 +77,10 @@ def taken_timing(
     return _ProgramTaker(light, plans, loops or {}).timing()
 
 
+_LONGEST_PARAM = 1e9
+"""Seconds."""
+
+
 class _ProgramTaker:
     def __init__(
         self,
@@ -123,7 +127,7 @@ class _ProgramTaker:
                     green = {n for n, letter in enumerate(stage.state) if letter in "Gg"}
                     for name, loop in self._loops.items():
                         if own.get(loop.lane) == name and green & set(loop.movements):
-                            gaps[name] = float(own.get("max-gap", 3.0))
+                            gaps[name] = _param_number(own, "max-gap", 3.0)
         return found
 
     def _all_phases(self) -> Iterator[FilePhase]:
@@ -155,7 +159,7 @@ class _ProgramTaker:
         """Groups that the file names itself, as our own export does; none if they do not fit."""
         params = self._plans[0].program.params
         found = {
-            key.removeprefix(GROUP_PARAM): tuple(map(int, value.split()))
+            key.removeprefix(GROUP_PARAM): _link_numbers(value)
             for key, value in params.items()
             if key.startswith(GROUP_PARAM)
         }
@@ -243,7 +247,7 @@ class _ProgramTaker:
         program, stages = self._plans[number].program, self._cycles[number]
         cycle = sum(s.seconds + sum(step.seconds for step in s.steps) for s in stages)
         if program.params.get("coordinated") == "true":
-            kept = float(program.params.get("cycleTime", cycle))
+            kept = _param_number(program.params, "cycleTime", cycle)
             offset = {"offset": (program.offset - stages[0].seconds) % kept}
             return offset | ({"cycle": kept} if self._is_actuated() else {})
         total = sum(phase.seconds for phase in program.phases)
@@ -401,3 +405,31 @@ def _fit_row(
         )
         rows[name, meeting[0]] = wanted
     return True
+
+
+def _link_numbers(text: str) -> tuple[int, ...]:
+    """Numbers of links; what is none is -1, which no light has."""
+    return tuple(
+        int(word) if word.isascii() and word.isdigit() and len(word) < 6 else -1
+        for word in text.split()
+    )
+
+
+def _param_number(params: Mapping[str, str], key: str, default: float) -> float:
+    """Seconds, above 0, that a program of SUMO has as a parameter.
+
+    Raises
+    ------
+    InputError
+        If it is another text.
+    """
+    text = params.get(key)
+    if text is None:
+        return default
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < _LONGEST_PARAM:
+        raise InputError(f"parameter {key} is {text[:40]!r}, not a number above 0")
+    return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError
@@ -10,6 +11,7 @@ from odscen.base.errors import InputError
 if TYPE_CHECKING:
     from pathlib import Path
 
+_PACKED = (".gz", ".bz2", ".pbf")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
@@ -29,8 +31,14 @@ def is_name(name: str) -> bool:
 
 
 def name_from_file(path: Path) -> str:
-    """Map name for a file: its stem, with everything unusual replaced by ``_``."""
-    return plain_name(path.stem) or "map"
+    """Map name for a file: its stem, with everything unusual replaced by ``_``.
+
+    Of a packed file it is the stem of what is packed: ``town`` for ``town.osm.bz2``.
+    """
+    stem = path.stem
+    if path.suffix.lower() in _PACKED and PurePath(stem).suffix.lower() == ".osm":
+        stem = PurePath(stem).stem
+    return plain_name(stem) or "map"
 
 
 def plain_name(text: str) -> str:

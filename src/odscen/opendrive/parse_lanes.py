@@ -59,6 +59,26 @@ _LANE_CHANGES: Final[dict[str | None, LaneChange]] = {
 R = TypeVar("R", LaneHeight, LaneSpeed)
 
 
+def open_sole_layer(lanes: Element, notes: Notes) -> dict[str, list[Element]]:
+    """Children of ``<lanes>`` by name: those of its lane layer (1.9) where it has nothing but one.
+
+    Of several layers, as for road works, which one traffic keeps to is not known.
+    """
+    groups = children(lanes)
+    layers = [
+        layer
+        for tag, found in groups.items()
+        if "layer" in tag.lower()
+        for layer in found
+        if layer.find("laneSection") is not None
+    ]
+    if "laneSection" in groups or len(layers) != 1:
+        return groups
+    notes.add(Rule.VERSION, layers[0], "the only lane layer, as OpenDRIVE 1.9 has them, holds")
+    offsets = {tag: groups[tag] for tag in ("laneOffset",) if tag in groups}
+    return {**offsets, **children(layers[0])}
+
+
 def parse_sections(
     lanes: Element, groups: dict[str, list[Element]], length: float, notes: Notes
 ) -> tuple[LaneSection, ...]:
@@ -69,8 +89,9 @@ def parse_sections(
         if layers:
             raise refusal(
                 lanes,
-                f"the lanes are in <{shown_id(layers[0])}> elements: lane layers, as OpenDRIVE 1.9 "
-                "has them, are not supported; save the map as 1.8 or older",
+                f"the lanes are in several <{shown_id(layers[0])}> elements: which of the lane "
+                "layers of OpenDRIVE 1.9 traffic keeps to is not clear; save the map with one, or "
+                "as 1.8 or older",
             )
         raise refusal(lanes, "there is no laneSection")
     starts: list[float] = []

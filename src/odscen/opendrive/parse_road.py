@@ -10,7 +10,7 @@ from odscen.base.errors import OpenDriveError
 from odscen.base.ids import JunctionId, RoadId
 from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_furniture import parse_objects, parse_signals
-from odscen.opendrive.parse_lanes import parse_sections
+from odscen.opendrive.parse_lanes import open_sole_layer, parse_sections
 from odscen.opendrive.parse_rules import (
     MAX_COORDINATE,
     MAX_NUMBER,
@@ -75,7 +75,7 @@ def parse_road(element: Element, notes: Notes) -> Road:
     lanes = only(groups, "lanes")
     if lanes is None:
         raise refusal(element, "there is no <lanes>")
-    lane_groups = children(lanes)
+    lane_groups = open_sole_layer(lanes, notes)
     signals, references = parse_signals(only(groups, "signals"), notes)
     return Road(
         id=RoadId(required(element, "id")),

@@ -163,3 +163,23 @@ def test_a_feed_needs_a_day_and_an_archive_that_is_whole(
     file.write_bytes(file.read_bytes()[:300])
     with pytest.raises(InputError, match="no zip archive that can be read"):
         import_transit(workspace, scenario, file, day=MONDAY)
+
+
+@pytest.mark.parametrize("value", ["1e308", "-90.1", "nan", "inf", "48_0", "north", "4 8"])
+def test_stops_that_are_nowhere_on_earth_are_refused_with_their_line(
+    workspace: Workspace, scenario: Scenario, tmp_path: Path, value: str
+) -> None:
+    table = f"stop_id,stop_name,stop_lat,stop_lon\na b,A,{value},11.0\nc,C,48.0,11.0\n"
+    with pytest.raises(InputError, match=r"stops\.txt: line 2, column stop_lat: .* is not"):
+        import_transit(workspace, scenario, feed(workspace, tmp_path, stops_txt=table), day=MONDAY)
+
+
+def test_stops_for_which_the_projection_has_no_place_are_away_from_the_region(
+    workspace: Workspace, scenario: Scenario, tmp_path: Path
+) -> None:
+    table = "stop_id,stop_name,stop_lat,stop_lon\na b,A,0.0,-79.0\nc,C,-48.0,-169.0\n"
+    _, placed = import_transit(
+        workspace, scenario, feed(workspace, tmp_path, stops_txt=table), day=MONDAY
+    )
+    assert placed.transit.stops == ()
+    assert placed.left_out["stops away from the region"] == 2

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
 import pytest
 
 from odscen.base.ids import LaneKey, RoadId
@@ -13,6 +16,7 @@ from odscen.lanegraph.graphs import MapGraph
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import OpenDrive
+from tests.convert.maps import converted, each_map
 from tests.opendrive.snippets import document, lane, road, section
 
 
@@ -184,3 +188,49 @@ def test_a_lane_that_is_open_to_no_vehicle_has_that_as_its_reason() -> None:
     reasons = [e.reason for e in network.report.entries if e.element.endswith("lane -1")]
     assert any(one.endswith("no SUMO lane: by its access no vehicle may use it") for one in reasons)
     assert LaneKey(RoadId("1"), 0, -1) not in network.table.lane_keys
+
+
+def stated_lanes(path: Path) -> dict[LaneKey, tuple[str, list[tuple[float, str, str]]]]:
+    """Type and access of each lane, straight from the file: s of the road, rule and who."""
+    found: dict[LaneKey, tuple[str, list[tuple[float, str, str]]]] = {}
+    for road_ in ET.parse(path).getroot().iterfind("road"):
+        for number, part in enumerate(road_.iterfind("lanes/laneSection")):
+            for one in part.iterfind("*/lane"):
+                rows = [
+                    (float(part.get("s")) + float(item.get("sOffset")), item.get("rule", ""), name)
+                    for item in one.iterfind("access")
+                    for name in [
+                        item.get("restriction"),
+                        *(below.get("type") for below in item.iterfind("restriction")),
+                    ]
+                    if name
+                ]
+                key = LaneKey(RoadId(road_.get("id")), number, int(one.get("id")))
+                found[key] = one.get("type"), rows
+    return found
+
+
+@each_map()
+def test_permissions_of_every_lane_are_those_of_its_type_and_access(path: Path) -> None:
+    network = converted(path).network.table
+    stated = stated_lanes(path)
+    seen = 0
+    for interval in network.intervals:
+        key, own = network.lane_keys[interval.lane], network.lane_list[interval.sumo]
+        if not isinstance(key, LaneKey) or network.edges[own.edge].function != "normal":
+            continue
+        kind, rows = stated[key]
+        if own.allowed == {"pedestrian"}:
+            assert kind in ("sidewalk", "walking", "shared", "driving")
+            continue
+        middle = float(interval.s[0] + interval.s[-1]) / 2.0
+        begun = [row for row in rows if row[0] <= middle]
+        holding = {row[1:] for row in begun if row[0] == begun[-1][0]}
+        if not holding:
+            assert own.allowed == allowed(kind), key
+        for rule, who in holding:
+            classes = {"bus": "bus", "truck": "truck", "bicycle": "bicycle", "taxi": "taxi"}
+            if who in classes:
+                assert (classes[who] in own.allowed) == (rule == "allow"), key
+        seen += 1
+    assert seen

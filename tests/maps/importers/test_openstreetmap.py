@@ -536,6 +536,25 @@ def test_a_restriction_over_a_way_forbids_the_turn_back_of_a_dual_carriageway() 
     )
 
 
+def test_roads_that_merge_have_lanes_of_their_own_where_there_are_enough() -> None:
+    nodes = {1: (-200, 0), 2: (0, 0), 3: (200, 0), 4: (-200, -40)}
+    ways = {
+        10: ([1, 2], {"highway": "motorway", "lanes": "2", "name": "main"}),
+        11: ([4, 2], {"highway": "motorway_link", "lanes": "1", "name": "ramp"}),
+        12: ([2, 3], {"highway": "motorway", "lanes": "3", "name": "on"}),
+    }
+    odr, _ = imported(place_of(nodes, ways))
+    names = {road.id: road.name for road in odr.roads.values()}
+    targets = {
+        (names[road.predecessor.element_id], lane.predecessors[0]): lane.successors[0]  # type: ignore[index, union-attr]
+        for road in odr.roads.values()
+        if road.junction
+        for lane in road.sections[0].lanes.values()
+        if lane.id
+    }
+    assert targets == {("main", -1): -1, ("main", -2): -2, ("ramp", -1): -3}
+
+
 def test_a_turn_bay_opens_before_the_junction_and_leads_left_only() -> None:
     nodes = {**CROSS, 6: (0.0, -40.0)}
     ways = {

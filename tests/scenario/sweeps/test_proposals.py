@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from odscen.base.errors import InputError, MissingDependencyError
 from odscen.scenario.sweeps.sweep_plan import Proposer, Range, SweepPlan, proposal_kind
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def proposer_of(method: str, *, axes: int, runs: int, seed: int) -> Proposer:
@@ -64,3 +69,22 @@ def test_without_optuna_tpe_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) 
 def test_an_unknown_method_is_refused_by_name() -> None:
     with pytest.raises(InputError, match="'best' is not one of grid, latin, sobol, random, tpe"):
         proposer_of("best", axes=1, runs=1, seed=0)
+
+
+def test_tpe_reads_nothing_that_is_stored_and_unpickles_nothing(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """What optuna keeps in files and databases has pickles in it."""
+    pytest.importorskip("optuna")
+    proposer: Any = proposer_of("tpe", axes=2, runs=30, seed=0)
+
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("something was unpickled")
+
+    for name in ("load", "loads", "Unpickler"):
+        monkeypatch.setattr(pickle, name, refuse)
+    monkeypatch.chdir(tmp_path)
+    for _ in range(6):
+        proposer.tell([float(place[0]) for place in proposer.ask(4)])
+    assert type(proposer._study._storage).__name__ == "InMemoryStorage"
+    assert list(tmp_path.iterdir()) == []

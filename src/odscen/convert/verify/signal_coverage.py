@@ -37,7 +37,11 @@ def compare_lights(
     ruled = _ruled_places(net, odr, drivable, keys)
     roads = set[str]().union(*(place.roads for place in ruled.values()))
     junctions = set[str]().union(*(place.junctions for place in ruled.values()))
-    places = set[str]().union(*stated.roads.values())
+    places = set[str]().union(*stated.roads.values()) | {
+        road.id
+        for road in odr.roads.values()
+        if any(signal_kind(signal) == "pedestrian_light" for signal in road.signals)
+    }
     return SignalCoverage(
         opendrive=len(stated.junctions),
         sumo=len(ruled),

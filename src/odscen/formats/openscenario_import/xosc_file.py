@@ -33,6 +33,7 @@ from odscen.formats.openscenario_import.world.read_entities import read_entities
 from odscen.formats.openscenario_import.world.read_environment import read_environment
 from odscen.lanegraph.query import largest_part
 from odscen.opendrive.lanes import RoadTable
+from odscen.scenario.document.problems import validated
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.templates.scene_template import STEADY, STEADY_DRIVER
 
@@ -140,7 +141,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
         "demand": {"clock": found.clock or 0.0},
         "rules": [rule for rule in story.rules if rule["actor"] in init.placed],
     }  # fmt: skip
-    return Scenario.model_validate(with_parameters(report, source.parameters, data))
+    return validated(Scenario, with_parameters(report, source.parameters, data))
 
 
 def report_without_map(source: MaplessSource, why: str, *, ego: EgoDriver = "story") -> None:

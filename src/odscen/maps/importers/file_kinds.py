@@ -73,7 +73,11 @@ def _xml_kind(root: str, content: bytes) -> FileKind:
             return FileKind("a Lanelet2 map", _NEEDS_IMPORTER)
         return FileKind("OpenStreetMap", _AS_OSM.format(".osm"))
     if root == "net":
-        return FileKind("a SUMO network", _BY_NETCONVERT.format("--sumo-net-file"))
+        return FileKind(
+            "a SUMO network",
+            "odscen import FILE.net.xml --out S.scenario.json makes a map of it, with the network "
+            "as it is; or " + _BY_NETCONVERT.format("--sumo-net-file"),
+        )
     if root == "commonRoad":
         return FileKind(
             "a CommonRoad scenario",

@@ -156,17 +156,33 @@ def measure_problems(
     if not scenario.measures:
         return
     places = PlaceNames(region.graph)
+    yield from measure_errors(scenario, region, lights, places=places)
+    for index, measure in enumerate(scenario.measures):
+        yield from _time_problems(scenario, measure, f"measures[{index}]")
+    yield from _cut_off(scenario, region, places)
+
+
+def measure_errors(
+    scenario: Scenario,
+    region: Region,
+    lights: Sequence[Light] | None = None,
+    *,
+    places: PlaceNames | None = None,
+) -> Iterator[Problem]:
+    """Yield what measures may not be, as :func:`measure_problems` without warnings.
+
+    Who is cut off by closures needs a search for routes; an edit is refused for errors only.
+    """
+    places = places or PlaceNames(region.graph)
     yield from _find_repeated_ids(scenario)
     outages = None if lights is None else _outage_problems(scenario, lights)
     for index, measure in enumerate(scenario.measures):
         where = f"measures[{index}]"
-        yield from _time_problems(scenario, measure, where)
         yield from _place_problems(measure, places, where)
         if isinstance(measure, LaneIncident):
             yield from _incident_problems(measure, places, region, where)
         if outages is not None:
             yield from outages.get(index, ())
-    yield from _cut_off(scenario, region, places)
 
 
 def _find_repeated_ids(scenario: Scenario) -> Iterator[Problem]:

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from odscen.scenario.demand.day_profiles import curve
+from odscen.scenario.demand.expected_users import refuse_too_many
 from odscen.scenario.demand.zones import zone_segments
 from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.sampling_config import PlacingRules
@@ -333,6 +334,7 @@ def background_trips(
         day = curve(scenario.demand, background.profile)
         passed = day.amount(end) - day.amount(begin)
         number = standing * passed / usual_duration(ground, background.mix)
+        refuse_too_many({f"background traffic {background.id!r}": number})
     first = tuple(stream(scenario.seed, "places", background.id).random(3).tolist())
     even = EvenShares(first)
     yield _draw_trips(scenario, ground, background, rng, even, name=background.id, number=number)

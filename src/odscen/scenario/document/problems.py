@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from odscen.base.errors import ScenarioError
+from odscen.base.shown import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -62,7 +63,9 @@ def _describe_problem(details: ErrorDetails) -> str:
 def _format_location(location: Iterable[str | int]) -> str:
     place = ""
     for step in location:
-        place += f"[{step}]" if isinstance(step, int) else f".{step}" if place else step
+        # Names of fields that are not known are those of the file, however long.
+        name = f"[{step}]" if isinstance(step, int) else printable(step[:_SHOWN])
+        place += f".{name}" if place and not name.startswith("[") else name
     return place
 
 

@@ -24,6 +24,7 @@ from pydantic import (
 )
 
 from odscen.base.errors import ScenarioError
+from odscen.base.shown import shown
 from odscen.scenario.document import document_parts, scenario_document, signals_document
 from odscen.scenario.document.problems import validation_problems
 from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
@@ -147,8 +148,9 @@ def read_edit(data: Mapping[str, Any]) -> EditBase:
         return _READER.validate_python({"kind": None, **data})
     except ValidationError as err:
         problems = validation_problems(err)
-        if data.get("kind") not in EDIT_ENTRIES:
-            problems = (f"kind: {data.get('kind')!r} is none of {', '.join(EDIT_ENTRIES)}",)
+        kind = data.get("kind")
+        if not isinstance(kind, str) or kind not in EDIT_ENTRIES:
+            problems = (f"kind: {shown(str(kind))} is none of {', '.join(EDIT_ENTRIES)}",)
         raise ScenarioError(
             f"this edit cannot be read: {problems[0]}", problems=problems[1:]
         ) from err

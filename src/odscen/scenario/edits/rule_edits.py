@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.scenario.checks.measure_checks import measure_problems
+from odscen.scenario.checks.measure_checks import measure_errors
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.checks.scenario_checks import duplicate_ids
 from odscen.scenario.document.measures_document import Measure  # noqa: TC001 (read at run time)
@@ -122,7 +122,7 @@ def set_measure(
     measures, _ = put_part(scenario.measures, measure, what=_MEASURE, instead_of=instead_of)
     scenario = with_fields(scenario, measures=measures)
     region = Region.of(graph, scenario.roi)
-    refuse_errors([*measure_problems(scenario, region, lights), *duplicate_ids(scenario)])
+    refuse_errors([*measure_errors(scenario, region, lights), *duplicate_ids(scenario)])
     return scenario
 
 

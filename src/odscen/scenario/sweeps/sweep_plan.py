@@ -254,7 +254,10 @@ class _Tpe:
                 constant_liar=True,
                 seed=plan.seed,
             )
-        self._study = optuna.create_study(sampler=sampler, direction="maximize")
+        # In memory: what is stored is unpickled when it is read, and cases are on the disk already.
+        self._study = optuna.create_study(
+            storage=optuna.storages.InMemoryStorage(), sampler=sampler, direction="maximize"
+        )
         self._ranges: dict[str, Any] = {
             f"x{axis:03}": optuna.distributions.FloatDistribution(0.0, 1.0)
             for axis in range(len(plan.axes))

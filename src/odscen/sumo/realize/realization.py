@@ -30,6 +30,7 @@ from odscen.runs.layout import (
 from odscen.runs.recording import region_xml
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.checks.signal_checks import signal_problems
+from odscen.scenario.demand.expected_users import expected_users, refuse_too_many
 from odscen.scenario.document.problems import refuse_errors
 from odscen.scenario.document.rules_document import appearing_actors
 from odscen.scenario.document.scenario_document import TripParking
@@ -175,7 +176,7 @@ def realize(
         actors=actors,
         elevation=sumo_map.elevation,
         slice_length=None  # SUMO's own flows and routes of a file have no slices
-        if project is not None
+        if project is not None and project.routes
         else slices_of(until, settings.slice_length, step_length),
         trajectories=recording.trajectories,
         measures=actions.measures,
@@ -208,7 +209,7 @@ def realize(
             project=project,
             begin=0.0 if scenario.sumo is None else scenario.sumo.begin,
             options=None
-            if scenario.sumo is None
+            if scenario.sumo is None or scenario.sumo.options is None
             else {
                 # Trips of the project may find no route where measures close their roads.
                 **({"ignore-route-errors": "true"} if actions.closed else {}),
@@ -336,7 +337,10 @@ def all_road_users(
     ------
     ScenarioError
         With every actor and flow whose spawn or goal is not usable.
+    LimitError
+        If there are more than a run may have; they are counted before they are made.
     """
+    refuse_too_many(expected_users(scenario, until=until))
     users = road_users(scenario, sumo_map.graph, region, until=until)
     if scenario.transit.lines:
         users = _in_order((*users, *line_users(scenario, region, until=until)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from time import thread_time
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from odscen.app.scenarios import SUFFIX
 from odscen.app.template_scenarios import template_scenario
 from odscen.app.variants import apply_edit
 from odscen.base.categories import Category
-from odscen.base.errors import InputError, NotFoundError
+from odscen.base.errors import InputError, LimitError, NotFoundError
 from odscen.figures.judging.criteria import criteria_problems
 from odscen.maps.folder_names import check_name, name_from_file
 from odscen.scenario.checks.scenario_checks import check
@@ -83,6 +84,8 @@ OnlyChanges = Annotated[
 
 _MOST_EDITS = 5000
 """In one request."""
+_EDIT_SECONDS = 4.0
+"""Of computing for the edits of one request: each looks at the whole document."""
 
 
 class EditRequest(BaseModel):
@@ -197,9 +200,14 @@ def edit(
     """Make edits, all or none; each kind is a function of ``odscen.scenario.edits``."""
 
     def change(scenario: Scenario) -> Scenario:
-        loaded = shared.map_of(scenario)
-        for edit in request.edits:
+        loaded, begun = shared.map_of(scenario), thread_time()
+        for number, edit in enumerate(request.edits):
             scenario = apply_edit(edit, scenario, loaded)
+            if thread_time() - begun > _EDIT_SECONDS and number + 1 < len(request.edits):
+                raise LimitError(
+                    f"these {len(request.edits):,} edits take longer than {_EDIT_SECONDS:g} s, of "
+                    f"which {number + 1:,} were possible in that time; send fewer at once"
+                )
         return scenario
 
     changed = shared.drafts.change(

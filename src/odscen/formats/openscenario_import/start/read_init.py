@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.base.errors import ScenarioError
 from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.places.map_points import MapPoint
 from odscen.formats.openscenario_import.places.read_trajectories import read_trajectory
@@ -15,6 +16,8 @@ from odscen.formats.openscenario_import.story.read_motions import put_there
 from odscen.formats.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.lanegraph.shortest_paths import Router
+from odscen.scenario.document.problems import validated
+from odscen.scenario.document.scenario_document import Actor
 from odscen.scenario.templates.scene_template import STEADY
 
 if TYPE_CHECKING:
@@ -261,6 +264,10 @@ _SAME_SPEED: Final = 1e-4
 """Metres and m/s within which a file says what the properties of an actor do."""
 
 
+def _is_formula(value: object) -> bool:
+    return isinstance(value, str) and "$" in value
+
+
 class InitReader:
     """What is at first: places, speeds and routes."""
 
@@ -407,6 +414,12 @@ class InitReader:
     ) -> dict[str, Any]:
         """Actor that odscen wrote; place, speed and goal of the file hold where they differ."""
         made = {"id": entity.id, "category": str(entity.category), **fields}
+        # Formulas become numbers when the whole document is read.
+        plain = {name: value for name, value in made.items() if not _is_formula(value)}
+        try:
+            validated(Actor, plain)
+        except ScenarioError as error:
+            raise RefusedError(entity.element, f"its properties: {error.problem}") from error
         nodes, then = self._positions, self._then.get(entity.id, [])
         there = nodes.of_node(made["spawn"])
         by_rule = entity.id in self._appear.late - self._appear.departing

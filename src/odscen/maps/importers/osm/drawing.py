@@ -654,6 +654,7 @@ def _find_movements(
 ) -> list[Movement]:
     """Movements of cars, buses and bicycles between the lanes of the legs."""
     movements: list[Movement] = []
+    flows: list[_Flow] = []
     outs = {leg: _approach(plans[leg.street], leg, arriving=False) for leg in legs}
     for leg in legs:
         start = _approach(plans[leg.street], leg, arriving=True)
@@ -692,19 +693,58 @@ def _find_movements(
                     element = f"road {plans[leg.street].id} to road {plans[exit_leg.street].id}"
                     source = f"way {places.leg_way(network, leg)}"
                     drawn.note(ElementOutcome.GUESSED, element, reason, 0.6, source)
-                for lane, target in places.match_lanes(
-                    lanes,
-                    lanes_at[exit_leg],
-                    turns[exit_leg],
-                    from_left=from_left and len(lanes) < len(coming),
-                ):
-                    movements.append(
-                        Movement(
-                            start, lane, outs[exit_leg], target, turns[exit_leg], paths[exit_leg]
+                if lanes:
+                    flows.append(
+                        _Flow(
+                            start,
+                            lanes,
+                            outs[exit_leg],
+                            lanes_at[exit_leg],
+                            turns[exit_leg],
+                            paths[exit_leg],
+                            from_left and len(lanes) < len(coming),
                         )
                     )
         movements += _bicycle_movements(start, exits, outs, turns, paths)
+    for flow in flows:
+        # Roads that merge have lanes of their own behind, if there are enough of them.
+        merging = [
+            other
+            for other in flows
+            if other.end.leg == flow.end.leg
+            and other.going == flow.going
+            and abs(other.turn) <= places.STRAIGHT_ON
+        ]
+        merging.sort(key=_Flow.lateral_place)
+        needed = sum(len(other.lanes) for other in merging)
+        if flow in merging and len(merging) > 1 and needed <= len(flow.going):
+            before = sum(len(other.lanes) for other in merging[: merging.index(flow)])
+            pairs = list(zip(flow.lanes, flow.going[before:], strict=False))
+        else:
+            pairs = places.match_lanes(flow.lanes, flow.going, flow.turn, from_left=flow.from_left)
+        movements += [
+            Movement(flow.start, lane, flow.end, target, flow.turn, flow.path)
+            for lane, target in pairs
+        ]
     return movements
+
+
+class _Flow(NamedTuple):
+    """Lanes of an approach that lead to an exit, and the lanes there, from left to right."""
+
+    start: Approach
+    lanes: list[int]
+    end: Approach
+    going: list[int]
+    turn: float
+    path: tuple[int, ...]
+    from_left: bool
+
+    def lateral_place(self) -> float:
+        """How far to the right of the exit, as traffic there looks, the approach is."""
+        exit_pose, pose = self.end.pose, self.start.pose
+        dx, dy = pose.x - exit_pose.x, pose.y - exit_pose.y
+        return dx * math.sin(exit_pose.hdg) - dy * math.cos(exit_pose.hdg)
 
 
 def _car_lanes(lanes: Sequence[StreetLane], kind: str) -> list[int]:

@@ -134,8 +134,9 @@ def lay_out(
         extent[a] += extent.pop(b)
         return True
 
+    known: dict[frozenset[int], tuple[Junction, dict[Leg, tuple[float, float]]]] = {}
     while True:
-        layout = _cut_streets(network, find)
+        layout = _cut_streets(network, find, known)
         joined = False
         for street in network.streets:
             first, last = street.nodes[0], street.nodes[-1]
@@ -166,7 +167,12 @@ def lay_out(
     return layout
 
 
-def _cut_streets(network: StreetNetwork, find: Callable[[int], int]) -> Layout:
+def _cut_streets(
+    network: StreetNetwork,
+    find: Callable[[int], int],
+    known: dict[frozenset[int], tuple[Junction, dict[Leg, tuple[float, float]]]],
+) -> Layout:
+    """Make the junctions of groups of nodes; ``known`` keeps them from one time to the next."""
     groups: dict[int, set[int]] = defaultdict(set)
     for node in network.ends:
         groups[find(node)].add(node)
@@ -174,21 +180,32 @@ def _cut_streets(network: StreetNetwork, find: Callable[[int], int]) -> Layout:
     cuts: dict[Leg, float] = {}
     bare: dict[Leg, float] = {}
     for number, (_, nodes) in enumerate(sorted(groups.items())):
-        junction = Junction(number, nodes)
-        for node in sorted(nodes):
-            for street_number, at_end in network.ends[node]:
-                street = network.streets[street_number]
-                inside = {street.nodes[0], street.nodes[-1]} <= nodes
-                if inside and street.nodes[0] != street.nodes[-1] and not is_ring(network, street):
-                    if not at_end:
-                        junction.inner.append(street_number)
-                else:
-                    junction.legs.append(Leg(street_number, at_end))
-        _order_legs(network, junction)
-        for leg, (cut, least) in _cut_legs(network, junction).items():
+        key = frozenset(nodes)
+        if key not in known:
+            known[key] = _make_junction(network, nodes)
+        junction, ends = known[key]
+        junction.number = number
+        for leg, (cut, least) in ends.items():
             cuts[leg], bare[leg] = cut, least
         junctions.append(junction)
     return Layout(junctions, cuts, bare)
+
+
+def _make_junction(
+    network: StreetNetwork, nodes: set[int]
+) -> tuple[Junction, dict[Leg, tuple[float, float]]]:
+    junction = Junction(0, nodes)
+    for node in sorted(nodes):
+        for street_number, at_end in network.ends[node]:
+            street = network.streets[street_number]
+            inside = {street.nodes[0], street.nodes[-1]} <= nodes
+            if inside and street.nodes[0] != street.nodes[-1] and not is_ring(network, street):
+                if not at_end:
+                    junction.inner.append(street_number)
+            else:
+                junction.legs.append(Leg(street_number, at_end))
+    _order_legs(network, junction)
+    return junction, _cut_legs(network, junction)
 
 
 def _outward(network: StreetNetwork, leg: Leg, distance: float) -> Pose:
@@ -278,8 +295,8 @@ def _reach_along(line: StreetLine, leg: Leg, area: shapely.Geometry) -> float:
     """How far along a leg, from its node, an area extends."""
     if area.is_empty:
         return 0.0
-    s = [line.project(*place) for place in shapely.get_coordinates(area).tolist()]
-    return line.length - min(s) if leg.at_end else max(s)
+    s = line.project_all(shapely.get_coordinates(area))
+    return line.length - float(s.min()) if leg.at_end else float(s.max())
 
 
 # ------------------------------------------------------------------ movements

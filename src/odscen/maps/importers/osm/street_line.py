@@ -108,11 +108,24 @@ class StreetLine:
 
     def places(self, s: FloatArray, t: FloatArray | float = 0.0) -> FloatArray:
         """Places ``(N, 2)`` at ``s``, so far to the left."""
-        poses = np.array([self.pose(float(value)) for value in s])
-        normal = np.column_stack([-np.sin(poses[:, 2]), np.cos(poses[:, 2])])
-        offset = np.broadcast_to(np.asarray(t, dtype=np.float64), s.shape)
-        placed: FloatArray = poses[:, :2] + normal * offset[:, None]
+        row = np.clip(np.searchsorted(self.starts, s, side="right") - 1, 0, len(self.arcs) - 1)
+        x, y, hdg, curvature, length = self._columns[:, row]
+        along = s - self.starts[row]
+        # Before the first arc and behind the last one straight on, as at its end.
+        curved = np.clip(along, 0.0, length)
+        half = curvature * curved / 2
+        chord = curved * np.sinc(half / np.pi)
+        px, py = x + chord * np.cos(hdg + half), y + chord * np.sin(hdg + half)
+        heading = hdg + 2 * half
+        cos, sin = np.cos(heading), np.sin(heading)
+        px, py = px + (along - curved) * cos, py + (along - curved) * sin
+        placed: FloatArray = np.column_stack([px - t * sin, py + t * cos])
         return placed
+
+    @cached_property
+    def _columns(self) -> FloatArray:
+        """x, y, heading, curvature and length of each arc; shape ``(5, N)``."""
+        return np.array([(*arc.start, arc.curvature, arc.length) for arc in self.arcs]).T
 
     @cached_property
     def _trace(self) -> tuple[shapely.LineString, FloatArray]:
@@ -126,8 +139,14 @@ class StreetLine:
 
     def project(self, x: float, y: float) -> float:
         """The s of the nearest place."""
+        return float(self.project_all(np.array([[x, y]]))[0])
+
+    def project_all(self, places: FloatArray) -> FloatArray:
+        """The s of the places nearest to others, shape ``(N, 2)``."""
         trace, _ = self._trace
-        return float(trace.project(shapely.Point(x, y)) * self.length / max(trace.length, 1e-9))
+        along = shapely.line_locate_point(trace, shapely.points(places))
+        projected: FloatArray = along * self.length / max(trace.length, 1e-9)
+        return projected
 
 
 def smooth_line(points: Sequence[tuple[float, float]]) -> StreetLine:
@@ -243,7 +262,7 @@ def curve_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> Cubic:
     if math.radians(20) < abs(turn) < math.radians(160):
         meet = v / math.sin(turn)  # along the end's tangent, back to where the tangents meet
         ahead = u - meet * math.cos(turn)
-        if meet > 0.0 and ahead > 0.0:
+        if min(meet, ahead) > 0.2 * chord:
             factor = 4.0 / 3.0 * math.tan(abs(turn) / 4) / math.tan(abs(turn) / 2)
             first, second = max(factor, 0.55) * ahead, max(factor, 0.55) * meet
     out = (u - second * math.cos(turn), v - second * math.sin(turn))

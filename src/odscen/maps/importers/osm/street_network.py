@@ -395,7 +395,7 @@ def _make_street(
         else:
             stretches.append(Stretch(way, ahead, i, i + 1))
     line = smooth_line([places[node] for node in nodes])
-    s = [line.project(*places[node]) for node in nodes]
+    s = line.project_all(np.array([places[node] for node in nodes])).tolist()
     s[0], s[-1] = 0.0, line.length
     s = np.maximum.accumulate(s).tolist()
     return Street(number, nodes, stretches, line, s)

@@ -31,7 +31,7 @@ def line_users(scenario: Scenario, region: Region, *, until: float) -> Iterator[
     nodes = {stop.id: _required_node(region, stop.node) for stop in scenario.transit.stops}
     for line in scenario.transit.lines:
         goal = _goal_of_line(scenario, line, region, nodes)
-        for number, depart in enumerate(_departure_times(scenario, line)):
+        for number, depart in enumerate(_departure_times(scenario, line, until)):
             if depart >= until:
                 break
             yield RoadUser(
@@ -46,10 +46,11 @@ def line_users(scenario: Scenario, region: Region, *, until: float) -> Iterator[
             )
 
 
-def _departure_times(scenario: Scenario, line: TransitLine) -> tuple[float, ...]:
+def _departure_times(scenario: Scenario, line: TransitLine, until: float) -> tuple[float, ...]:
+    """Times of a line; those of a headway are not made beyond ``until``."""
     if line.headway is None:
         return line.departures
-    end = scenario.simulation.duration if line.end is None else line.end
+    end = min(scenario.simulation.duration if line.end is None else line.end, until)
     return tuple(np.round(np.arange(line.begin, end, line.headway), 2).tolist())
 
 
