@@ -13,7 +13,6 @@ import unicodedata
 from collections import Counter, defaultdict
 from dataclasses import dataclass
 from itertools import pairwise
-from statistics import median
 from typing import TYPE_CHECKING, Final
 
 from odscen.base.errors import InputError
@@ -721,7 +720,8 @@ class FreeTable:
                 "(--interval says how long they are)"
             )
             return HOUR
-        return float(median(steps))
+        often = Counter(round(step, 3) for step in steps)
+        return float(min(step for step, number in often.items() if number == max(often.values())))
 
     def _station_place(self, row: Sequence[str], line: int) -> StationPlace:
         def number(role: str) -> float | None:
