@@ -1488,6 +1488,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "those of today" }),
   msg({ message: "through: without driveways and aisles of car parks" }),
   msg({ message: "time to collision with a place" }),
+  msg({ message: "time {time} is not after {time2}" }),
   msg({ message: "time {time} is not that of slice {index} of {lines} equal slices of {length} min from {time2} on" }),
   msg({ message: "times must grow" }),
   msg({ message: "times of vertices that do not grow" }),
