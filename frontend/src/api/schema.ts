@@ -4809,14 +4809,15 @@ export interface components {
          * @description Files and options of a SUMO project.
          *
          *     ``begin`` is when its simulation begins, seconds; times of the run are those of SUMO, and
-         *     nothing happens before. ``options`` are SUMO's own, beside those that the simulation has.
+         *     nothing happens before. ``options`` are SUMO's own, beside those that the simulation has;
+         *     without them the run has odscen's.
          */
         SumoProject: {
             /** @default 0 */
             begin: number;
             options: {
                 [key: string]: string;
-            };
+            } | null;
             /** @default [] */
             files: components["schemas"]["SumoFile"][];
         };

@@ -119,20 +119,25 @@ def import_(
         typer.Argument(help="SUMO's programs: .tll.xml, .add.xml or .net.xml.", metavar="FILE"),
     ],
     junction: JunctionOption = None,
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", help="Refuse a program that conflicts or is not one of stages."),
+    ] = False,
     out: OutOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Take programs over from SUMO's tlLogic, with WAUT as plans of the day, and its loops.
 
-    A program that conflicts, or whose intergreens are too short, is refused.
+    A program that conflicts, whose intergreens are too short, or that stages cannot say runs as it
+    is: its phases stay SUMO's own, and what was found in it is printed.
     """
     from odscen.app import scenarios
     from odscen.app.signals.signal_plans import import_signals
     from odscen.maps.store import Workspace
 
     document, notes = import_signals(
-        Workspace.open(workspace), scenario, file, junctions=junction or ()
+        Workspace.open(workspace), scenario, file, junctions=junction or (), strict=strict
     )
     path = scenarios.write_scenario(document, out or scenario)
     for note in notes:

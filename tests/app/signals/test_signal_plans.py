@@ -7,6 +7,7 @@ import re
 import subprocess
 from typing import TYPE_CHECKING
 
+import polars as pl
 import pytest
 
 from odscen.app.exchange.exports import export
@@ -19,6 +20,7 @@ from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.maps.netconvert import NetconvertLimits, run_netconvert
 from odscen.maps.store import Workspace
 from odscen.records.light_programs import programs_from_json, stage_spans
+from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from tests.signal_case import MAP, one_plan, program, scenario
@@ -193,7 +195,7 @@ def test_what_is_no_program_of_this_light_is_refused_with_its_place(
 ) -> None:
     file = written(tmp_path, phases)
     with pytest.raises(InputError, match=message) as raised:
-        import_signals(workspace, placed(workspace, scenario(None)), file)
+        import_signals(workspace, placed(workspace, scenario(None)), file, strict=True)
     assert "J10001" in str(raised.value)
     assert "own.tll.xml" in str(raised.value)
 
@@ -206,7 +208,10 @@ def test_a_tllogic_that_shows_a_stage_twice_in_a_cycle_is_refused(
     once += [(20.0, second), (3.0, end), (5.0, red)]
     with pytest.raises(InputError, match="comes twice in a cycle") as raised:
         import_signals(
-            workspace, placed(workspace, scenario(None)), written(tmp_path, [*once, *once])
+            workspace,
+            placed(workspace, scenario(None)),
+            written(tmp_path, [*once, *once]),
+            strict=True,
         )
     assert "J10001" in str(raised.value)
 
@@ -218,7 +223,10 @@ def test_a_tllogic_with_conflicting_greens_is_refused_with_both_movements(
     rest = [(30.0, "r" * 10 + "G" * 14), (12.0, "r" * 10 + "y" * 10 + "rrrr")]
     with pytest.raises(ScenarioError, match="which meet") as raised:
         import_signals(
-            workspace, placed(workspace, scenario(None)), written(tmp_path, [*walks, *rest])
+            workspace,
+            placed(workspace, scenario(None)),
+            written(tmp_path, [*walks, *rest]),
+            strict=True,
         )
     assert "cannot have green together" in str(raised.value)
 
@@ -232,10 +240,42 @@ def test_a_tllogic_with_short_intergreens_is_refused_with_both_times(
     walking = [(6.0, "r" * 20 + "GGGG"), (12.0, red)]
     with pytest.raises(ScenarioError, match="is too short") as raised:
         import_signals(
-            workspace, placed(workspace, scenario(None)), written(tmp_path, [*phases, *walking])
+            workspace,
+            placed(workspace, scenario(None)),
+            written(tmp_path, [*phases, *walking]),
+            strict=True,
         )
     assert "4 s between group" in str(raised.value)
     assert "needs 8 s" in str(raised.value)
+
+
+def test_a_program_with_short_intergreens_runs_as_it_is_with_what_was_found(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    first, yellow, red, second, end = NETS
+    first = first[:20] + "rrrr"
+    phases = [(20.0, first), (3.0, yellow), (1.0, red), (20.0, second), (3.0, end), (9.0, red)]
+    phases += [(6.0, "r" * 20 + "GGGG"), (12.0, red)]
+    made, notes = import_signals(
+        workspace, placed(workspace, scenario(None)), written(tmp_path, phases)
+    )
+    (note,) = notes
+    assert "runs as it is in the file" in note
+    assert "4 s between group" in note
+    assert not made.signals.junctions
+    (light,) = signal_programs(workspace, made)
+    (plan,) = light.plans
+    assert [(phase.seconds, phase.state) for phase in plan.phases] == phases
+    done = run(workspace, made, settings=RunSettings(until=160.0), name="in-force")
+    assert done.status.value == "completed"
+    log = pl.read_parquet(done.folder / "signal_states.parquet").sort("time")
+    shown = dict(zip(log["time"].to_list(), log["state"].to_list(), strict=True))
+    cycle = [state for seconds, state in phases for _ in range(int(seconds))]
+    for second in range(1, 150):
+        since = max(time for time in shown if time <= second)
+        assert shown[since] == cycle[second % len(cycle)], second
+    again, notes = import_signals(workspace, made, tmp_path / "own.tll.xml")
+    assert again == made
 
 
 def test_a_junction_without_a_light_is_answered_with_those_that_have_one(

@@ -181,6 +181,51 @@ def test_a_road_too_short_for_a_junction_of_its_own_says_so() -> None:
     assert "controls no movement" in reasons(network, ElementOutcome.LOST)["7"]
 
 
+@pytest.mark.parametrize(
+    ("length", "link"), [(2.0, ("1.0.f", "2.0.f", 0)), (0.8, ("1.0.f", "3.0.f", 0))]
+)
+def test_a_road_of_some_metres_between_others_has_its_light(
+    length: float, link: tuple[str, str, int]
+) -> None:
+    between = to("1", "end", after=False) + to("3", "start")
+    network = made(
+        straight("1", link=to("2", "start"), lanes=LINKED),
+        straight("2", light(7, 0.5), start=200.0, length=length, lanes=LINKED, link=between),
+        straight("3", start=200.0 + length, link=to("2", "end", after=False), lanes=LINKED),
+    )
+    assert lit_links(network) == [link]
+    assert verify(network.network.net_xml, network.odr, network.roads).passed
+
+
+def test_lights_every_few_metres_do_not_swallow_their_road() -> None:
+    network = made(straight("1", *(light(number, 2.0 * number) for number in range(5, 95))))
+    lengths = [lane.length for lane in network.network.table.lanes.values() if lane.id[0] != ":"]
+    assert len(network.network.table.lights) >= 5
+    assert sum(lengths) > 0.0
+    assert lights_found(network) == (90, 0)
+
+
+@pytest.mark.parametrize("more", ['rule="LHT"', 'rule="RHT"'])
+def test_lights_act_on_either_side_of_the_road(more: str) -> None:
+    text = document(straight("1", light(7, 80.0))).replace(
+        'junction="-1" ', f'junction="-1" {more}'
+    )
+    assert lit_links(of_model(parse(text))) == [("1.0.f", "1.1.f", 0)]
+
+
+def test_a_light_where_no_vehicle_drives_is_lost_and_breaks_no_limit() -> None:
+    network = made(straight("1", light(7, 80.0), lanes=section(lane(-1, kind="sidewalk"))))
+    assert "controls no movement" in reasons(network, ElementOutcome.LOST)["7"]
+    assert lights_found(network) == (0, 0)
+    assert verify(network.network.net_xml, network.odr, network.roads).passed
+
+
+def test_a_reference_to_a_light_acts_where_it_is() -> None:
+    reference = '<signalReference id="7" s="120" t="0" orientation="-"/></signals>'
+    network = made(straight("1", light(7, 80.0)).replace("</signals>", reference))
+    assert lit_links(network) == [("1.0.f", "1.1.f", 0), ("1.2.b", "1.1.b", 0)]
+
+
 def before_junction(*lights: str, length: float, own: str = "") -> str:
     """A crossing whose leg 1 begins with a road of its own that has lights."""
     text = crossing({"1": own} if own else {})

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from copy import deepcopy
 from typing import TYPE_CHECKING
+
+from lxml import etree
 
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.given_files import read_given
+from odscen.base.xml_reading import read_xml
 from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
+from odscen.scenario.document.sumo_document import SumoFile, SumoProject
 from odscen.scenario.edits.edit_registry import changed_part, with_fields
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Collection, Sequence
     from pathlib import Path
 
     from odscen.formats.tll_file import SignalFile
@@ -108,8 +114,12 @@ def import_signals(
     file: Path,
     *,
     junctions: Sequence[str] = (),
+    strict: bool = False,
 ) -> tuple[Scenario, tuple[str, ...]]:
     """Take programs of lights over from a SUMO file, in place of those that the scenario has.
+
+    A program that stages cannot say, or that we would not allow, such as one with short
+    intergreens, runs as it is: raw phases, as SUMO's own file, with what was found beside it.
 
     Parameters
     ----------
@@ -121,6 +131,8 @@ def import_signals(
         Additional file of SUMO with ``tlLogic``.
     junctions
         Lights, by OpenDRIVE junction or SUMO's id; all that the file and the map have if empty.
+    strict
+        Refuse such programs instead.
 
     Returns
     -------
@@ -130,11 +142,12 @@ def import_signals(
     Raises
     ------
     InputError
-        If the file cannot be read, or a program in it is not one of stages; names the program.
+        If the file cannot be read, or a program in it is not one of this light; names the program.
     NotFoundError
         If a junction has no light.
     ScenarioError
-        If greens conflict or intergreens are too short, with the movements and times.
+        With ``strict``, if greens conflict or intergreens are too short, with the movements and
+        times.
     """
     return take_signals(
         workspace,
@@ -142,6 +155,7 @@ def import_signals(
         read_given(file),
         file=str(file),
         junctions=junctions,
+        strict=strict,
     )
 
 
@@ -152,6 +166,7 @@ def take_signals(
     *,
     file: str,
     junctions: Sequence[str] = (),
+    strict: bool = False,
 ) -> tuple[Scenario, tuple[str, ...]]:
     """Take programs over from the content of a file; see :func:`import_signals`.
 
@@ -176,6 +191,7 @@ def take_signals(
             )
     timings = {timing.junction: timing for timing in scenario.signals.junctions}
     notes: list[str] = []
+    raw: list[str] = []
     with in_file(file):
         parsed = parse_signal_file(content)
         found = {program.light for program in parsed.programs} & (wanted or views.keys())
@@ -186,14 +202,89 @@ def take_signals(
                 continue
             loops = taken_loops(parsed.loops.values(), light, loaded.sumo.net)
             plans = _take_day_plans(parsed, light.id, scenario.demand.clock, notes)
-            timing, more = taken_timing(views[light.id], plans, loops=loops)
+            try:
+                timing, more = taken_timing(views[light.id], plans, loops=loops)
+                own = changed_part(scenario.signals, {"junctions": (timing,)})
+                refuse_errors(signal_problems(own, loaded.lights))
+            except InputError as error:
+                states = [phase.state for plan in plans for phase in plan.program.phases]
+                fits = {len(state) for state in states} == {len(light.phases[0].state)}
+                if strict or not fits:
+                    raise
+                raw.append(light.id)
+                notes.append(f"tlLogic {light.id!r} runs as it is in the file: {_reasons(error)}")
+                for name in views[light.id].names:
+                    timings.pop(name, None)
+                continue
             notes += more
             for name in views[light.id].names:
                 timings.pop(name, None)
             timings[timing.junction] = timing
+        scenario = _with_raw_programs(scenario, content, raw, found)
     signals = changed_part(scenario.signals, {"junctions": tuple(timings.values())})
     refuse_errors(signal_problems(signals, loaded.lights))
     return with_fields(scenario, signals=signals), tuple(notes)
+
+
+def _reasons(error: InputError) -> str:
+    problems = getattr(error, "problems", ()) or ()
+    return "; ".join(map(str, problems)) or str(error)
+
+
+_IN_FORCE = "in-force."
+"""How names of programs begin that run as they are."""
+RAW_PROGRAMS = "programs-in-force.add.xml"
+"""File of a scenario with programs that run as they are."""
+
+
+def _with_raw_programs(
+    scenario: Scenario, content: bytes, raw: Sequence[str], taken: Collection[str]
+) -> Scenario:
+    """Keep the elements of a file that belong to these lights as SUMO's own file.
+
+    Those of an earlier file stay for lights that are not among ``taken``.
+    """
+    project = scenario.sumo or SumoProject()
+    old = [file for file in project.files if file.name == RAW_PROGRAMS]
+    kept = [file for file in project.files if file.name != RAW_PROGRAMS]
+    parts: list[etree._Element] = []
+    for file in old:
+        parts += _elements_of_lights(read_xml(file.text), lambda light: light not in taken)
+    parts += _elements_of_lights(read_xml(content), lambda light: light in raw)
+    if not parts:
+        files: tuple[SumoFile, ...] = tuple(kept)
+    else:
+        root = etree.Element("additional")
+        root.extend(parts)
+        counts = dict(sorted(Counter(str(part.tag) for part in parts).items()))
+        text = etree.tostring(root, encoding="unicode", pretty_print=True)
+        files = (*kept, SumoFile.of(RAW_PROGRAMS, "additional", text, counts))
+    if not files and scenario.sumo is None:
+        return scenario
+    changed = project.model_copy(update={"files": files})
+    return scenario.model_copy(update={"sumo": changed})
+
+
+def _elements_of_lights(
+    root: etree._Element, wanted: Callable[[str], bool]
+) -> list[etree._Element]:
+    """Programs of some lights with their WAUTs, and detectors before them if they need any."""
+    programs = [logic for logic in root.iter("tlLogic") if wanted(logic.get("id", ""))]
+    at = [one for one in root.iter("wautJunction") if wanted(one.get("junctionID", ""))]
+    names = {one.get("wautID") for one in at}
+    wauts = [waut for waut in root.iter("WAUT") if waut.get("id") in names]
+    loops: list[etree._Element] = []
+    if any(logic.get("type", "static") != "static" for logic in programs):
+        tags = ("inductionLoop", "e1Detector", "laneAreaDetector", "e2Detector")
+        loops = [loop for tag in tags for loop in root.iter(tag)]
+    parts = [deepcopy(part) for part in (*loops, *programs, *wauts, *at)]
+    for element in [inner for part in parts for inner in part.iter()]:
+        # The network may have a program of the same name already, which SUMO refuses.
+        for key in ("programID", "startProg", "to"):
+            name = element.get(key)
+            if name is not None and not name.startswith(_IN_FORCE):
+                element.set(key, _IN_FORCE + name)
+    return parts
 
 
 def _take_day_plans(

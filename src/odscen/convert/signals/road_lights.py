@@ -35,8 +35,14 @@ APART = 15.0
 STANDS_BEHIND = 20.0
 """Metres past a junction within which a light is one on the far side of it."""
 
+LONGEST_GAP = 2.0 * APART
+"""Metres between the first and the last light of one place."""
+
 HALF_GAP = 0.5
 """Metres of road before and behind a light that its junction has."""
+
+LEAST_GAP = 0.1
+"""Metres of such a junction, at least."""
 
 LEAST_STUB = 1.0
 """Metres of road that stay between such a gap and a junction, or the end of the road."""
@@ -235,15 +241,28 @@ class RoadLights:
             for number, connection in enumerate(self._connections):
                 if connection.source in arriving:
                     lane = self._edges[connection.source].lanes[connection.source_lane]
-                    row = lane.alignment[-1].row
+                    rows = [lane.alignment[-1].row]
                 elif not arriving and connection.target in leaving:
                     lane = self._edges[connection.target].lanes[connection.target_lane]
-                    row = lane.alignment[0].row
+                    rows = [lane.alignment[0].row]
+                elif not own:
+                    rows = self._rows_over(connection, stop.read.road, growing=growing)
                 else:
                     continue
-                if stop.read.applies_to(int(self._table.lane_id[row])):
+                if any(stop.read.applies_to(int(self._table.lane_id[row])) for row in rows):
                     numbers.append(number)
         return numbers
+
+    def _rows_over(
+        self, connection: PlannedConnection, road: RoadId, *, growing: bool
+    ) -> list[int]:
+        """Lanes of a road that is a junction as a whole, under a connection of one direction."""
+        lane_road, row = self._table.lane_road, self._table.road_index[road]
+        return [
+            stretch.row
+            for stretch in connection.alignment
+            if lane_road[stretch.row] == row and (stretch.end > stretch.start) == growing
+        ]
 
 
 def _same_s(one: float, other: float) -> bool:
@@ -293,7 +312,8 @@ def _near_each_other(lights: Sequence[StandingLight]) -> Iterator[list[StandingL
     """Lights in the order of s in groups."""
     group: list[StandingLight] = []
     for light in lights:
-        if group and light.place.s - group[-1].place.s > APART:
+        apart = group and light.place.s - group[-1].place.s > APART
+        if apart or (group and light.place.s - group[0].place.s > LONGEST_GAP):
             yield group
             group = []
         group.append(light)
@@ -316,10 +336,16 @@ def _gap_of_lights(
     for gap in taken:
         if low - LEAST_STUB < gap.end and gap.start < high + LEAST_STUB:
             return gap
-    if low < first or (low > first and low < LEAST_STUB) or high > last or low >= high:
+    low, high = max(low, first), min(high, last)
+    if low >= high:
         return None
-    whole = high - low >= road.length - LEAST_STUB
-    return None if whole else RoadGap(low, high)
+    if high - low < road.length - LEAST_STUB:
+        return RoadGap(low, high)
+    if not (_leads_on(road, "start") and _leads_on(road, "end")) or road.length > LONGEST_GAP:
+        return None
+    # A road of some metres between two others keeps one; a shorter one is the junction as a whole.
+    rest = LEAST_STUB if road.length > LEAST_STUB + LEAST_GAP else 0.0
+    return RoadGap(0.0, road.length - rest)
 
 
 def _leads_on(road: Road, end: str) -> bool:

@@ -70,9 +70,10 @@ class SumoProject(Part):
     """Files and options of a SUMO project.
 
     ``begin`` is when its simulation begins, seconds; times of the run are those of SUMO, and
-    nothing happens before. ``options`` are SUMO's own, beside those that the simulation has.
+    nothing happens before. ``options`` are SUMO's own, beside those that the simulation has;
+    without them the run has odscen's.
     """
 
     begin: Seconds = 0.0
-    options: dict[str, str] = Field(default_factory=dict, max_length=200)
+    options: Annotated[dict[str, str], Field(max_length=200)] | None = None
     files: tuple[SumoFile, ...] = ()

@@ -20,6 +20,8 @@ from lxml import etree
 from odscen.base.categories import DEFAULT_BODY, Body, Category
 from odscen.base.errors import InputError, in_file
 from odscen.base.xml_reading import read_xml
+from odscen.convert.imported.net_import import stage_numbers
+from odscen.convert.model.net import STAGE, Phase
 from odscen.lanegraph.query import node_id
 from odscen.records.run_plan import PlannedActor
 from odscen.runs import layout
@@ -27,6 +29,7 @@ from odscen.runs import layout
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.document.sumo_document import SumoFile, SumoProject
     from odscen.sumo.realize.sumo_map import SumoMap
 
@@ -140,6 +143,56 @@ def project_files(
         reader.actors(),
         tuple(reader.notes),
     )
+
+
+def lights_in_force(project: SumoProject, lights: Sequence[SumoLight]) -> tuple[SumoLight, ...]:
+    """Lights with the programs that files of a project give them: raw phases, as they are.
+
+    Of several programs it is that which a WAUT begins with, or else the last.
+    """
+    programs: dict[str, list[etree._Element]] = {}
+    starts: dict[str, str] = {}
+    for file in project.files:
+        if file.kind != "additional" or not file.elements.get("tlLogic"):
+            continue
+        with in_file(file.name):
+            root = read_xml(file.text, huge=True)
+        for logic in root.iterchildren("tlLogic"):
+            programs.setdefault(logic.get("id", ""), []).append(logic)
+        plans = {waut.get("id"): waut.get("startProg", "") for waut in root.iterchildren("WAUT")}
+        for at in root.iterchildren("wautJunction"):
+            starts[at.get("junctionID", "")] = plans.get(at.get("wautID"), "")
+    found = []
+    for light in lights:
+        own = programs.get(light.id, [])
+        start = [logic for logic in own if logic.get("programID", "0") == starts.get(light.id)]
+        for logic in (start or own)[-1:]:
+            rows = list(logic.iterchildren("phase"))
+            states = [row.get("state", "") for row in rows]
+            if not rows or {len(state) for state in states} != {len(light.phases[0].state)}:
+                continue
+            stages = stage_numbers(states)
+            phases = tuple(
+                Phase(
+                    _number(row.get("duration")) or 0.0,
+                    state,
+                    f"{STAGE}{stage}" if stage else "",
+                    *_bounds(row),
+                )
+                for row, state, stage in zip(rows, states, stages, strict=True)
+            )
+            offset = _number(logic.get("offset")) or 0.0
+            light = light._replace(phases=phases, offset=offset)  # noqa: PLW2901
+        found.append(light)
+    return tuple(found)
+
+
+def _bounds(phase: etree._Element) -> tuple[float, float]:
+    """Bounds of a phase that vehicles may prolong; 0 and 0 where the file has none."""
+    least, most = _number(phase.get("minDur")), _number(phase.get("maxDur"))
+    if least is None or most is None or least == most:
+        return 0.0, 0.0
+    return least, most
 
 
 def allowed_options(options: Mapping[str, str]) -> dict[str, str]:

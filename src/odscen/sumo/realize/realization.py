@@ -176,7 +176,7 @@ def realize(
         actors=actors,
         elevation=sumo_map.elevation,
         slice_length=None  # SUMO's own flows and routes of a file have no slices
-        if project is not None
+        if project is not None and project.routes
         else slices_of(until, settings.slice_length, step_length),
         trajectories=recording.trajectories,
         measures=actions.measures,
@@ -209,7 +209,7 @@ def realize(
             project=project,
             begin=0.0 if scenario.sumo is None else scenario.sumo.begin,
             options=None
-            if scenario.sumo is None
+            if scenario.sumo is None or scenario.sumo.options is None
             else {
                 # Trips of the project may find no route where measures close their roads.
                 **({"ignore-route-errors": "true"} if actions.closed else {}),

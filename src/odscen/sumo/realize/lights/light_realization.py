@@ -41,6 +41,7 @@ from odscen.sumo.realize.lights.stage_phases import (
     plan_phases,
     started_offset,
 )
+from odscen.sumo.realize.project_files import lights_in_force
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -114,6 +115,10 @@ def realized_lights(
         Seconds that the run lasts; the scenario's duration if not given.
     """
     signals = scenario.signals
+    if scenario.sumo is not None:
+        lights = lights_in_force(scenario.sumo, sumo_map.lights)
+        if lights != sumo_map.lights:
+            sumo_map = replace(sumo_map, lights=lights)
     if not signals.junctions:
         return _mapped_lights(sumo_map, signals.control, buses=signals.bus_priority)
     timings = {timing.junction: timing for timing in signals.junctions}
