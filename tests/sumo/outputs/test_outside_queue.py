@@ -31,10 +31,16 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     scenario = empty(MAP)
     graph = sumo_map.graph
     scenario = set_input(
-        scenario, graph, inflow="stem", segment="r3", per_hour=HOURLY, to=(("r1", 1), ("r2", 1))
+        scenario,
+        graph,
+        inflow="stem",
+        segment="r3",
+        per_hour=HOURLY,
+        arrivals="even",
+        to=(("r1", 1), ("r2", 1)),
     )
     scenario = set_input(
-        scenario, graph, inflow="main", segment="r2", per_hour=500, to=(("r1", 1),)
+        scenario, graph, inflow="main", segment="r2", per_hour=500, arrivals="even", to=(("r1", 1),)
     )
     scenario = edits.set_simulation(scenario, duration=UNTIL, step_length=STEP)
     settings = RunSettings(interval=300.0)
