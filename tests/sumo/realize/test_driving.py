@@ -19,12 +19,15 @@ from odscen.scenario.document.drivers_document import Drivers, DriverSet
 from odscen.scenario.document.scenario_document import Actor
 from odscen.sumo.realize.driving import (
     KINDS,
+    NORMAL_DRIVERS,
     STYLES,
     Driver,
     draw_factor,
+    draw_temper,
     driver,
     kind_of,
     number,
+    spread_headway,
 )
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.weather_effects import (
@@ -52,7 +55,7 @@ def test_a_normal_car_in_good_weather_has_the_documented_parameters() -> None:
         "vClass": "passenger", "guiShape": "passenger", "length": "5", "width": "1.8",
         "height": "1.5", "maxSpeed": "55.56", "speedDev": "0", "accel": "2.6", "decel": "4.5",
         "emergencyDecel": "9", "tau": "1.1", "sigma": "0", "minGap": "2", "impatience": "0.3",
-        "lcMaxSpeedLatStanding": "0", "lcMaxSpeedLatFactor": "0.3",
+        "lcMaxSpeedLatStanding": "0.5", "lcMaxSpeedLatFactor": "0.3",
         "emissionClass": "HBEFA4/PC_petrol_Euro-4",
     }  # fmt: skip
 
@@ -276,3 +279,45 @@ def test_numbers_are_written_in_fixed_notation_that_reads_back(value: float, dig
     assert "e" not in text
     assert text != "-0"
     assert math.isclose(float(text), value, abs_tol=0.5000001 * 10**-digits)
+
+
+def test_drivers_of_flows_follow_each_other_at_headways_of_their_own_and_others_as_designed() -> (
+    None
+):
+    design = Actor(id="one", category=Category.CAR, spawn="1.0.-1.0")
+
+    def member(k: int) -> RoadUser:
+        return RoadUser(
+            f"f.{k}", Category.CAR, 0, 1, depart=0.0, speed=None, design=design, flow="f"
+        )
+
+    def headway(user: RoadUser, drivers: Drivers = NORMAL_DRIVERS) -> tuple[float, float]:
+        kind = kind_of(user, drivers, 7)
+        made = driver(
+            user, DEFAULT_BODY[Category.CAR], factor=1.0, limit=13.89, weather=NO_EFFECT,
+            kind=kind, drivers=drivers,
+        )  # fmt: skip
+        values = dict(made.attributes)
+        return float(values["tau"]), float(values["accel"])
+
+    found = [headway(member(k)) for k in range(800)]
+    taus = [tau for tau, _ in found]
+    assert len(set(taus)) == 8  # so many vTypes, not one for each vehicle
+    assert statistics.mean(taus) == pytest.approx(1.1, abs=0.02)
+    # A headway below 1 s at 30 m/s.
+    assert 0.15 < sum(tau < 0.77 for tau in taus) / 800 < 0.3
+    # Who follows closely accelerates more and drives faster.
+    assert [a for _, a in sorted(found)] == sorted((a for _, a in found), reverse=True)
+    fast = [draw_factor(7, f"f.{k}", "normal", Category.CAR) for k in range(800)]
+    assert -0.55 < statistics.correlation(taus, fast) < -0.25
+    assert found == [headway(member(k)) for k in range(800)]
+    # Where steps are as long as the shortest headways, the mean still holds.
+    coarse = [spread_headway(draw_temper(7, f"f.{k}"), 1.1, 1.0) for k in range(800)]
+    assert min(coarse) == 1.0
+    assert statistics.mean(coarse) == pytest.approx(1.1, abs=0.01)
+    assert spread_headway(1.5, 0.9, 1.0) == 0.9
+    # A single actor is the mean driver; a saturation flow that is wished holds on average.
+    user = RoadUser("one", Category.CAR, 0, 1, depart=0.0, speed=None, design=design)
+    assert headway(user) == (1.1, 2.6)
+    wished = [headway(member(k), Drivers(saturation_flow=1800))[0] for k in range(800)]
+    assert 3600 / (statistics.mean(wished) + 0.57) == pytest.approx(1800, rel=0.02)

@@ -70,7 +70,8 @@ def _xml_kind(root: str, content: bytes) -> FileKind:
     if root == "osm":
         # Relations come last in a file, so all of it is searched.
         if re.search(rb"""v=["'](?:lanelet|regulatory_element)["']""", content):
-            return FileKind("a Lanelet2 map", _NEEDS_IMPORTER)
+            advice = "add it under a name that ends with .osm (`odscen maps importers`: lanelet2)"
+            return FileKind("a Lanelet2 map", advice)
         return FileKind("OpenStreetMap", _AS_OSM.format(".osm"))
     if root == "net":
         return FileKind(

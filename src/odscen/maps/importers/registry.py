@@ -12,6 +12,7 @@ from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.learning.offered_options import options_of, values_for
 from odscen.maps.importers.base import ImportedMap, ImportRecord, MapImporter
 from odscen.maps.importers.file_kinds import file_kind
+from odscen.maps.importers.lanelet2.importer import Lanelet2Importer
 from odscen.maps.importers.opendrive import OpenDriveImporter
 from odscen.maps.importers.openstreetmap import OpenStreetMapImporter
 
@@ -24,7 +25,11 @@ if TYPE_CHECKING:
 GROUP = "odscen.map_importers"
 """Group of entry points."""
 
-SHIPPED: tuple[type[MapImporter], ...] = (OpenDriveImporter, OpenStreetMapImporter)
+SHIPPED: tuple[type[MapImporter], ...] = (
+    OpenDriveImporter,
+    Lanelet2Importer,
+    OpenStreetMapImporter,
+)
 """Importers of odscen's own, in the order in which they are listed."""
 
 _ORIGINAL = "original"

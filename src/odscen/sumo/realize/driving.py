@@ -9,7 +9,10 @@ needs longer headways the longer the steps: at a stop line 14 % fewer vehicles p
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from functools import lru_cache
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
@@ -105,9 +108,26 @@ PASSING = 0.57
 NORMAL_DRIVERS = Drivers()
 WALKING_DEVIATION = 0.1
 """Of the speed factor of pedestrians for whom no speed is given."""
+TEMPERS = 8
+"""Kinds of drivers that those of flows and demand are divided into, equally many of each, so that
+few vTypes have to be written."""
+HEADWAY_DEVIATION = 0.38
+"""Of the logarithm of the desired headway.
+
+Those of drivers who follow are spread log-normally with 0.3 to 0.5: Treiber and Kesting, "Traffic
+Flow Dynamics", 2013, chapter 4; Brackstone, Waterson and McDonald, "Determinants of following
+headway in congested traffic", Transportation Research Part F 12, 2009.
+"""
+SPEED_CORRELATION = -0.4
+"""Of the desired headway with the speed factor: who drives fast follows closely (there)."""
+EAGER_ACCELERATION = 0.15
+"""Of the logarithm of the acceleration: who follows closely accelerates more."""
 LATERAL_SHARE = 0.3
-"""Of its speed that a vehicle moves aside at most, so that it does not while it is stopped: 17
-degrees of heading."""
+"""Of its speed that a vehicle moves aside at most, beside :data:`LATERAL_STANDING`: 17 degrees of
+heading."""
+LATERAL_STANDING = 0.5
+"""m/s that a stopped vehicle moves aside at most: with none, who has come to the end of its lane
+never leaves it."""
 ALWAYS = 1_000_000
 """Seconds after the beginning of red in which it is not heeded; more than any red lasts."""
 TWO_WHEELER_MIN_GAP = 0.5
@@ -139,11 +159,13 @@ class DriverKind:
     """How one driver drives: a style, and what a driver set says instead, each drawn.
 
     ``drawn`` has SUMO's parameters by name; ``car_following`` is empty for SUMO's default model.
+    ``temper`` is how much headway a driver wants: standard normal, 0 is the mean driver.
     """
 
     style: DrivingStyle = "normal"
     drawn: Mapping[str, float] = field(default_factory=dict)
     car_following: str = ""
+    temper: float = 0.0
 
 
 NORMAL_KIND = DriverKind()
@@ -152,8 +174,9 @@ NORMAL_KIND = DriverKind()
 def kind_of(user: RoadUser, drivers: Drivers, seed: int) -> DriverKind:
     """Kind of a road user, the same whatever else is in the scenario.
 
-    Members of flows and demand draw their style by the shares of ``drivers``; of a driver set each
-    draws its own parameters.
+    Members of flows and demand draw their style by the shares of ``drivers``, and how closely they
+    follow; single actors are the mean driver of their style. Of a driver set each draws its own
+    parameters.
 
     Raises
     ------
@@ -173,10 +196,46 @@ def kind_of(user: RoadUser, drivers: Drivers, seed: int) -> DriverKind:
             return DriverKind(driver_set.style, drawn, "" if model == "Krauss" else model)
     for style in STYLES:
         if style == name:
-            return DriverKind(style)
+            return DriverKind(
+                style, temper=0.0 if user.flow is None else draw_temper(seed, user.id)
+            )
     raise ScenarioError(
         f"{user.id!r} drives as {name!r}, which is neither a driving style nor a driver set"
     )
+
+
+def draw_temper(seed: int, actor: str) -> float:
+    """How much headway one driver wants, correlated with its speed factor; one of a few values."""
+    fast = float(stream(seed, "speed factor", actor).normal())
+    own = float(stream(seed, "headway", actor).normal())
+    z = SPEED_CORRELATION * fast + math.sqrt(1.0 - SPEED_CORRELATION**2) * own
+    share = 0.5 * (1.0 + math.erf(z / math.sqrt(2.0)))
+    group = min(TEMPERS - 1, int(share * TEMPERS))
+    return NormalDist().inv_cdf((group + 0.5) / TEMPERS)
+
+
+@lru_cache(maxsize=1024)
+def spread_headway(temper: float, mean: float, least: float) -> float:
+    """Headway that a driver of this temper keeps, seconds.
+
+    Parameters
+    ----------
+    temper
+        As of :func:`draw_temper`; 0 is the mean driver.
+    mean, least
+        Of all tempers, seconds. None is shorter than ``least``; the others keep less for it, so
+        that the mean holds as long as it is longer.
+    """
+    if not temper or mean <= least:
+        return mean
+    spread = [NormalDist().inv_cdf((group + 0.5) / TEMPERS) for group in range(TEMPERS)]
+    shares = [math.exp(HEADWAY_DEVIATION * z) for z in spread]
+    low, high = 0.0, mean * TEMPERS
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        enough = sum(max(middle * share, least) for share in shares) >= mean * TEMPERS
+        low, high = (low, middle) if enough else (middle, high)
+    return max(high * math.exp(HEADWAY_DEVIATION * temper), least)
 
 
 def draw_factor(seed: int, actor: str, style: DrivingStyle, category: Category) -> float:
@@ -240,7 +299,7 @@ def driver(
             factor = max(factor, speed / limit)
     max_speed = min(max_speed * weather.speed, weather.sight_speed)
     factor *= weather.speed
-    values = _driver_parameters(category, kind, drivers)
+    values = _driver_parameters(category, kind, drivers, step_length)
     accel = values.pop("accel") * weather.grip
     attributes = (
         ("vClass", traits.vclass),
@@ -255,7 +314,7 @@ def driver(
         ("tau", number(max(values.pop("tau"), step_length) * weather.headway)),
         ("sigma", number(values.pop("sigma"))),
         ("minGap", number(values.pop("minGap"))),
-        ("lcMaxSpeedLatStanding", "0"),
+        ("lcMaxSpeedLatStanding", number(LATERAL_STANDING)),
         ("lcMaxSpeedLatFactor", number(LATERAL_SHARE)),
         *((name, number(values[name])) for name in DRIVER_PARAMETERS if name in values),
         (
@@ -266,15 +325,17 @@ def driver(
     return Driver(attributes, max_speed, round(factor, 4), accel)
 
 
-def _driver_parameters(category: Category, kind: DriverKind, drivers: Drivers) -> dict[str, float]:
+def _driver_parameters(
+    category: Category, kind: DriverKind, drivers: Drivers, step_length: float
+) -> dict[str, float]:
     """SUMO's parameters of a driver before weather; what is SUMO's default is left out."""
     traits, style = KINDS[category], STYLES[kind.style]
     two_wheeler = category in (Category.MOTORCYCLE, Category.BICYCLE)
     values = {
-        "accel": traits.accel * style.accel,
+        "accel": traits.accel * style.accel * math.exp(-EAGER_ACCELERATION * kind.temper),
         "decel": traits.decel,
         "emergencyDecel": traits.emergency_decel,
-        "tau": normal_headway(drivers) * style.headway,
+        "tau": spread_headway(kind.temper, normal_headway(drivers) * style.headway, step_length),
         "sigma": 0.0,
         "minGap": style.min_gap * (TWO_WHEELER_MIN_GAP if two_wheeler else 1.0),
         **_gaps_and_changes(style, drivers),

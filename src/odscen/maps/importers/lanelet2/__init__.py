@@ -1,0 +1,1 @@
+"""Lanelet2 maps, and others that are made of lanelets, as OpenDRIVE."""
