@@ -18,6 +18,7 @@ ALL = (
     "netconvert_maps",
     "capacity",
     "saturation",
+    "intervals",
     "weather",
     "signal_timing",
     "assignment",

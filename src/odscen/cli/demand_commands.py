@@ -179,6 +179,11 @@ def import_(
         )  # fmt: skip
         _print_traffic(given_file, report)
         reports.append({"file": str(given_file), **report.to_dict()})
+    if profile is not None:
+        own = next(part for part in document.demand.profiles if part.id == (name or "profile"))
+        hours, rest = divmod(round((own.begin or 0.0) / 60.0), 60)
+        minutes = own.seconds / len(own.shares) / 60.0
+        log(f"Profile {own.id}: {len(own.shares)} slices of {minutes:g} min from {hours}:{rest:02}")
     path = scenarios.write_scenario(document, out or scenario)
     _report_demand(document.demand.model_dump(mode="json"), path, as_json=as_json, reports=reports)
 

@@ -220,6 +220,7 @@ def test_tables_are_read_with_seconds_or_times_of_day() -> None:
         (read_profile, "time,share\n0:00,1\n7:00,3\n13:00,3\n", "line 4: time '13:00'"),
         (read_profile, "time,share\n0:00,1\n13:00,3\n", "line 3: 2 slices of 780 min end after"),
         (read_profile, "time,share\n7:00,1\n", "line 2: one slice has no length"),
+        (read_profile, "time,share\n9:00,1\n7:00,1\n", "line 3: time '7:00' is not after '9:00'"),
         (read_zones, "zone,segment\nold town,r1\n", "line 2: zone must be .*not 'old town'"),
         (read_counts, "place,begin,end,count\nr1," + "9" * 200_000, "line 2: this is no table"),
     ],

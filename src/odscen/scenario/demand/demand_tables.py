@@ -177,11 +177,14 @@ def read_profile(text: str) -> ProfileTable:
         return ProfileTable(shares, None, None)
     begins = [line.time("time", 0.0) for line in lines]
     if len(lines) == 1:
-        problem = "one slice has no length that its time tells; a whole day has no times"
+        problem = "one slice has no length that its time would give; a whole day has no times"
         raise InputError(problem, element=lines[0].where)
     length = begins[1] - begins[0]
+    if length <= 0:
+        problem = f"time {lines[1]['time']!r} is not after {lines[0]['time']!r}"
+        raise InputError(problem, element=lines[1].where)
     for index, line in enumerate(lines):
-        if length <= 0 or abs(begins[index] - begins[0] - index * length) > 1.0:
+        if abs(begins[index] - begins[0] - index * length) > 1.0:
             raise InputError(
                 f"time {line['time']!r} is not that of slice {index + 1} of {len(lines)} equal "
                 f"slices of {length / 60.0:g} min from {lines[0]['time']} on",
