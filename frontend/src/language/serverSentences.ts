@@ -954,7 +954,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "one of its nodes is not in the graph" }),
   msg({ message: "one of several groups, of which any may hold" }),
   msg({ message: "one sees {dense} m: the densest fog that there is" }),
-  msg({ message: "one slice has no length that its time tells; a whole day has no times" }),
+  msg({ message: "one slice has no length that its time would give; a whole day has no times" }),
   msg({ message: "only arrives at its speed in 1.0" }),
   msg({ message: "only the first plan of the day" }),
   msg({ message: "only the first {most_listed} road users are in the plan" }),
