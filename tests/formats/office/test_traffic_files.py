@@ -405,3 +405,45 @@ def test_detector_counts_of_wildau() -> None:
 def test_detectors_of_acosta() -> None:
     read = read_traffic((PROJECTS / "acosta" / "acosta_detectors.add.xml").read_bytes())
     assert read.what == "definitions of 58 SUMO detectors"
+
+
+@pytest.mark.parametrize(
+    ("text", "first"),
+    [
+        (
+            "ts,site_id,lane_no,speed_kmh,vol_5min\n2024-05-06 00:00:00,S1,1,55,12\n"
+            "2024-05-06 00:00:00,S1,2,50,3\n2024-05-06 00:05:00,S1,1,55,10\n",
+            ("S1", 0.0, 300.0, 15.0),
+        ),
+        (
+            "Timestamp,Station,District,Freeway,Direction,Total Flow,Avg Speed\n"
+            "01/02/2023 00:05:00,400001,4,101,N,120,60\n01/02/2023 00:10:00,400001,4,101,N,9,60\n",
+            ("400001", 300.0, 600.0, 120.0),
+        ),
+        (
+            "TKZST;Datum;Stunde;KFZ_R1;Lkw_R1\n9001;230501;01;120;4\n9001;230501;24;90;3\n"
+            "9001;230501;02;70;3\n",
+            ("9001", 0.0, 3600.0, 120.0),
+        ),
+        (
+            "detid_15;tag;stunde;q_kfz_det_hr;v_kfz_det_hr\n1001;01.03.2022;0;53;60\n"
+            "1001;01.03.2022;1;41;60\n",
+            ("1001", 0.0, 3600.0, 53.0),
+        ),
+        (
+            "Segment ID,Roadway,Direction,Date,12:00-1:00 AM,11:00-12:00 PM\n"
+            "2153,HUGUENOT AVE,NB,02/02/2013,106,74\n",
+            ("2153", 0.0, 3600.0, 106.0),
+        ),
+        ("Site: 12\n\nTime;Volume\n07:00;12\n07:15;13\n", ("station", 25200.0, 26100.0, 12.0)),
+    ],
+)
+def test_tables_of_agencies_are_read_without_a_word(
+    text: str, first: tuple[str, float, float, float]
+) -> None:
+    assert read_traffic(text.encode()).volumes[0][:4] == first
+
+
+def test_a_matrix_with_titles_of_several_words() -> None:
+    read = read_traffic(b"orig_taz,dest_taz,demand\n1,2,30.5\n2,1,12\n")
+    assert [row[:3] for row in read.trips] == [("1", "2", 30.5), ("2", "1", 12.0)]

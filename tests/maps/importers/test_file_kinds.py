@@ -64,7 +64,7 @@ def test_what_is_no_xml_has_no_root_element() -> None:
     ("content", "message"),
     [
         (b'<?xml version="1.0"?><osm version="0.6"/>', "OpenStreetMap, not OpenDRIVE: give it"),
-        (b"<net/>", "a SUMO network, not OpenDRIVE: netconvert makes OpenDRIVE of it"),
+        (b"<net/>", "a SUMO network, not OpenDRIVE: odscen import FILE.net.xml"),
         (b"<commonRoad/>", "a CommonRoad scenario, not OpenDRIVE: export its map as OpenDRIVE"),
         (b"\x0a\x12binary\x00\x01", "binary data, not OpenDRIVE: convert it"),
     ],

@@ -13,7 +13,6 @@ import unicodedata
 from collections import Counter, defaultdict
 from dataclasses import dataclass
 from itertools import pairwise
-from statistics import median
 from typing import TYPE_CHECKING, Final
 
 from odscen.base.errors import InputError
@@ -41,13 +40,13 @@ HOUR = 3600.0
 _ROLES: Final[dict[str, str]] = {
     "station": r"place|stations?|detectors?|dets?|sensors?|sites?|loops?|locations?|devices?|zst"
     r"|(?:zahl|mess|zaehl)stellen?|messquerschnitt|mq|querschnitt|stelle|edges?|links?|segments?"
-    r"|kanten?|strecken?|roads?|streets?|strassen?|str|spur|counter|induktionsschleife|name|id"
+    r"|kanten?|strecken?|roads?|streets?|strassen?|str|counter|induktionsschleife|name|id|tkzst|detid"
     r"|(?:station|detector|det|sensor|site|loop|location|device|edge|lane|link|segment|counter"
     r"|zahlstelle|zahlstellen|messstelle)(?:id|name|nr|no|number|nummer|code)",
     "time": r"time|times?tamp|begin|start|starttime|begintime|timebegin|timestart|from|fromtime"
     r"|von|vonzeit|zeit|zeitpunkt|uhrzeit|zeitstempel|datetime|datumzeit|datumuhrzeit|zeitvon"
     r"|interval|intervall|intervalbegin|intervalstart|hour|hourofday|stunde|heure|hora|t|minute"
-    r"|period|zeitraum",
+    r"|period|zeitraum|ts",
     "end": r"end|endtime|timeend|totime|to|until|stop|bis|biszeit|zeitbis|ende|intervalend",
     "date": r"date|datum|day|tag|jour|fecha",
     "count": r"counts?|volumes?|vol|flows?|q|qkfz|kfz|vehicles?|veh|anzahl|menge|number|n|total"
@@ -58,6 +57,7 @@ _ROLES: Final[dict[str, str]] = {
     "x": r"x|xcoord|xkoord|easting|east|ost|rechtswert",
     "y": r"y|ycoord|ykoord|northing|north|nord|hochwert",
     "bearing": r"bearing|heading|direction|dir|richtung|fahrtrichtung",
+    "number": r"lane|lane(no|nr|number|num|index)|spur(nr)?|fahrstreifen(nr)?|fs(nr)?|kanal",
     "edge": r"edges?|edgeid|sumoedge|kante",
     "lane": r"laneid|sumolane",
     "pos": r"pos|position",
@@ -84,6 +84,26 @@ _COMPASS = {
     "eastbound": 90.0, "southbound": 180.0, "westbound": 270.0, "nord": 0.0, "ost": 90.0,
     "sud": 180.0, "sued": 180.0,
 }  # fmt: skip
+
+
+ONLY_STATION = "station"
+"""Name of the station of a table that has one and does not name it."""
+_NO_COUNTS = frozenset(("v", "speed", "avg", "occ", "occupancy", "mean", "geschwindigkeit", "kmh"))
+"""Words of titles of columns that count nothing."""
+
+
+def _is_title_of(role: str, title: str) -> bool:
+    return re.fullmatch(_ROLES[role], normalised(title)) is not None
+
+
+def _has_word_of(role: str, title: str) -> bool:
+    """Whether a word of a title is one of a role: ``q_kfz_det`` has a count."""
+    words = [normalised(word) for word in re.split(r"[^A-Za-z0-9À-ÿ]+", title)]
+    if role in ("count", "trips") and _NO_COUNTS.intersection(words):
+        return False
+    if len(words) < 2 or role in ("x", "y", "edge", "lane", "pos", "lon", "lat", "number", "end"):
+        return False
+    return any(len(word) > 1 and re.fullmatch(_ROLES[role], word) for word in words)
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,17 +250,16 @@ class FreeTable:
         self.columns[role] = self._table.titles[column]
 
     def _guess(self, *roles: str) -> None:
-        """Give roles that have no column the first whose title is one of theirs."""
-        taken = set(self._index.values())
-        for role in roles:
-            if role in self._index:
-                continue
-            pattern = re.compile(_ROLES[role])
-            for column, title in enumerate(self._table.titles):
-                if column not in taken and pattern.fullmatch(normalised(title)):
-                    self._put(role, column)
-                    taken.add(column)
-                    break
+        """Give roles that have no column the first whose title, or a word of it, is one of theirs.
+
+        Titles that are one of a role as a whole go first.
+        """
+        for fits in (_is_title_of, _has_word_of):
+            for role in roles:
+                taken = set(self._index.values())
+                for column, title in enumerate(self._table.titles):
+                    if role not in self._index and column not in taken and fits(role, title):
+                        self._put(role, column)
 
     def read(self) -> TrafficFile:
         """Read what it is.
@@ -258,7 +277,10 @@ class FreeTable:
         if zones is not None:
             return self._read_zones(*zones)
         pairs = [
-            any(re.fullmatch(_ROLES[role], title) for title in titles)
+            any(
+                _is_title_of(role, title) or _has_word_of(role, title)
+                for title in self._table.titles
+            )
             for role in ("origin", "destination", "trips")
         ]
         timed = any(re.fullmatch(_ROLES["station"], title) for title in titles)
@@ -268,10 +290,11 @@ class FreeTable:
             if {"origin", "destination", "trips"} <= self._index.keys():
                 return self._read_pairs()
         slices = self._time_columns()
-        if len(slices) >= 2:
+        if len(slices) >= 2 and len(slices) >= len(titles) - 8:
             self._guess("station", "date", "bearing", "lon", "lat", "x", "y", "edge", "lane", "pos")
             return self._read_wide(slices)
-        self._guess("lon", "lat", "edge", "lane", "pos", "date", "time", "end", "count", "station")
+        self._guess("lon", "lat", "edge", "lane", "pos", "number", "date", "time", "end")
+        self._guess("count", "station")
         self._guess("bearing", "x", "y")
         return self._read_long()
 
@@ -378,10 +401,13 @@ class FreeTable:
         )
         rows: list[VolumeRow] = []
         stations: dict[str, StationPlace] = {}
+        chosen = self._chosen_date()
         for row, line in zip(self._table.rows, self._table.lines, strict=True):
             station = row[self._index["station"]]
             if not station:
                 self._leave_out(line, "no station")
+                continue
+            if chosen is not None and row[self._index["date"]] != chosen:
                 continue
             stations.setdefault(station, self._station_place(row, line))
             for column in slices:
@@ -396,10 +422,31 @@ class FreeTable:
         total = len(self._table.rows) * len(slices)
         return self._file(what, total, volumes=tuple(rows), stations=_placed(stations), of_day=True)
 
+    def _chosen_date(self) -> str | None:
+        """Text of the day that is taken of a table with a day in each row."""
+        if "date" not in self._index:
+            return None
+        days = Counter(row[self._index["date"]] for row in self._table.rows)
+        asked = self._options.date
+        if asked is not None:
+            reader = StampReader(days, compact=True)
+            for text in days:
+                day = reader.read(text).day
+                if text == asked or (day is not None and day.isoformat() == asked):
+                    return text
+            raise InputError(f"the table has no rows of {shown(asked)}")
+        chosen = max(days, key=lambda text: days[text])
+        if len(days) > 1:
+            self._notes.append(
+                f"the table has {len(days)} days: {chosen} was taken (--date chooses another)"
+            )
+        return chosen
+
     def _read_long(self) -> TrafficFile:
         table = self._table
         classes = self._class_columns()
-        if "count" not in self._index and not classes and "time" in self._index:
+        counted = "count" in self._index or bool(classes)
+        if not counted and "time" in self._index and "station" not in self._index:
             return self._read_station_columns()
         if "station" not in self._index:
             for role in ("edge", "lane"):
@@ -410,7 +457,14 @@ class FreeTable:
         placed = placed or {"x", "y"} <= self._index.keys()
         if "station" in self._index and placed and "count" not in self._index and not classes:
             return self._read_places()
-        missing = [role for role in ("station", "time") if role not in self._index]
+        if counted and "time" in self._index and "station" not in self._index:
+            self._notes.append(
+                f"no column names a station: all rows are of one, called {ONLY_STATION!r}; say "
+                "where it is in a table of stations"
+            )
+        only = counted and "time" in self._index
+        needed = ("time",) if only else ("station", "time")
+        missing = [role for role in needed if role not in self._index]
         if "count" not in self._index and not classes:
             missing.append("count")
         if missing:
@@ -452,7 +506,7 @@ class FreeTable:
         read: list[tuple[str, Stamp, float | None, float, int]] = []
         stations: dict[str, StationPlace] = {}
         for row, line in zip(table.rows, table.lines, strict=True):
-            station = row[self._index["station"]]
+            station = row[self._index["station"]] if "station" in self._index else ONLY_STATION
             if not station:
                 self._leave_out(line, "no station")
                 continue
@@ -486,7 +540,11 @@ class FreeTable:
                 "stamps have an offset to UTC; their own times of day were taken "
                 "(--time-zone Europe/Berlin converts them)"
             )
-        kept = self._one_day(read)
+        kept = (
+            self._add_lanes(self._one_day(read))
+            if "number" in self._index
+            else (self._one_day(read))
+        )
         length = self._slice_length([(name, stamp.second) for name, stamp, *_ in kept])
         volumes = []
         for station, stamp, end, value, line in kept:
@@ -503,6 +561,18 @@ class FreeTable:
             stations=_placed(stations),
             of_day=any(stamp.of_day for _, stamp, *_ in kept),
         )
+
+    def _add_lanes(
+        self, read: Sequence[tuple[str, Stamp, float | None, float, int]]
+    ) -> list[tuple[str, Stamp, float | None, float, int]]:
+        """Rows of the lanes of a station at one time as one row."""
+        sums: dict[tuple[str, Stamp, float | None], tuple[float, int]] = {}
+        for station, stamp, end, value, line in read:
+            before, first = sums.get((station, stamp, end), (0.0, line))
+            sums[station, stamp, end] = before + value, first
+        if len(sums) < len(read):
+            self._notes.append("rows of the lanes of a station were added up")
+        return [(*key, value, line) for key, (value, line) in sums.items()]
 
     def _read_station_columns(self) -> TrafficFile:
         """A time in each row, and a column for each station."""
@@ -591,8 +661,17 @@ class FreeTable:
         elif name == "time" and any(t in ("qPKW", "qLKW") for t in self._table.titles):
             unit = "min"
             self._notes.append("times are minutes, as in the detector files of SUMO's tools")
+        cells = [row[column] for row in self._table.rows]
+        hours = {int(cell) for cell in cells if cell.isdecimal() and len(cell) <= 2}
+        counted_from_1 = unit == "h" and 24 in hours and 0 not in hours
+        if counted_from_1:
+            self._notes.append("hours are counted from 1 to 24: the first begins at midnight")
         return StampReader(
-            (row[column] for row in self._table.rows), unit=unit, time_zone=self._options.time_zone
+            cells,
+            unit=unit,
+            time_zone=self._options.time_zone,
+            compact=role == "date",
+            hours_from_1=counted_from_1,
         )
 
     def _one_day(
@@ -641,7 +720,8 @@ class FreeTable:
                 "(--interval says how long they are)"
             )
             return HOUR
-        return float(median(steps))
+        often = Counter(round(step, 3) for step in steps)
+        return float(min(step for step, number in often.items() if number == max(often.values())))
 
     def _station_place(self, row: Sequence[str], line: int) -> StationPlace:
         def number(role: str) -> float | None:

@@ -24,6 +24,10 @@ _RANGE = re.compile(
     r"(\d{1,2}(?:[:.]\d{2}(?:[:.]\d{2})?)?)\s*(?:-|–|—|bis|to)\s*(\d{1,2}(?:[:.]\d{2}(?:[:.]\d{2})?)?)"
     r"(?:\s*(?:Uhr|h))?"
 )
+_HALF_RANGE = re.compile(
+    r"(\d{1,2}(?::\d{2})?)\s*([AaPp][Mm])?\s*(?:-|–|to)\s*(\d{1,2}(?::\d{2})?)\s*([AaPp][Mm])"
+)
+_COMPACT = re.compile(r"(\d{2}|\d{4})(\d{2})(\d{2})")
 _YEAR_FIRST = re.compile(rf"(\d{{4}})[-/.](\d{{1,2}})[-/.](\d{{1,2}})(?:[T,\s]+{_TIME})?(.*)")
 _YEAR_LAST = re.compile(
     rf"(\d{{1,2}})([-/.])(\d{{1,2}})[-/.](\d{{4}}|\d{{2}})(?:[T,\s]+{_TIME})?(.*)"
@@ -57,6 +61,10 @@ class StampReader:
         Of bare numbers.
     time_zone
         Where the stations are, for stamps with an offset.
+    compact
+        Whether bare numbers of six or eight digits are days, ``230501``.
+    hours_from_1
+        Whether hours are counted from 1, so that 1 is the one from midnight on.
 
     Raises
     ------
@@ -65,9 +73,17 @@ class StampReader:
     """
 
     def __init__(
-        self, cells: Iterable[str], *, unit: Unit = "s", time_zone: str | None = None
+        self,
+        cells: Iterable[str],
+        *,
+        unit: Unit = "s",
+        time_zone: str | None = None,
+        compact: bool = False,
+        hours_from_1: bool = False,
     ) -> None:
         self._unit: Unit = unit
+        self._compact = compact
+        self._first_hour = 1 if hours_from_1 else 0
         self.had_offset = False
         try:
             self._zone = None if time_zone is None else ZoneInfo(time_zone)
@@ -107,6 +123,15 @@ class StampReader:
             return self._dated(text, (year, month, day), match.groups()[4:8], match[9])
         if match := _ONLY_TIME.fullmatch(text):
             return Stamp(None, _seconds(match.groups()[:4], text), None, of_day=True)
+        if self._compact and (match := _COMPACT.fullmatch(text)):
+            year = int(match[1]) + (2000 if len(match[1]) == 2 else 0)
+            return self._dated(text, (year, int(match[2]), int(match[3])), (None,) * 4, None)
+        if match := _HALF_RANGE.fullmatch(text):
+            end = self.read(f"{_with_minutes(match[3])} {match[4]}").second
+            begin = self.read(f"{_with_minutes(match[1])} {match[2] or match[4]}").second
+            if begin > end > 0 and match[2] is None:  # 11:00-12:00 PM
+                begin -= DAY / 2
+            return Stamp(None, begin, end if end > begin else end + DAY, of_day=True)
         if match := _RANGE.fullmatch(text):
             begin, end = (self.read(_with_minutes(part)).second for part in match.groups())
             return Stamp(None, begin, end if end > begin else end + DAY, of_day=True)
@@ -120,6 +145,7 @@ class StampReader:
             seconds = number / (1000.0 if number >= 1e11 else 1.0)
             return self._in_zone(datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=seconds))
         of_day = self._unit == "h"
+        number -= self._first_hour if of_day else 0
         return Stamp(None, number * SECONDS[self._unit], None, of_day=of_day)
 
     def _dated(
