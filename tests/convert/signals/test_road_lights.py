@@ -213,6 +213,13 @@ def test_lights_act_on_either_side_of_the_road(more: str) -> None:
     assert lit_links(of_model(parse(text))) == [("1.0.f", "1.1.f", 0)]
 
 
+def test_a_light_where_no_vehicle_drives_is_lost_and_breaks_no_limit() -> None:
+    network = made(straight("1", light(7, 80.0), lanes=section(lane(-1, kind="sidewalk"))))
+    assert "controls no movement" in reasons(network, ElementOutcome.LOST)["7"]
+    assert lights_found(network) == (0, 0)
+    assert verify(network.network.net_xml, network.odr, network.roads).passed
+
+
 def test_a_reference_to_a_light_acts_where_it_is() -> None:
     reference = '<signalReference id="7" s="120" t="0" orientation="-"/></signals>'
     network = made(straight("1", light(7, 80.0)).replace("</signals>", reference))

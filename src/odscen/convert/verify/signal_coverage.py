@@ -11,6 +11,7 @@ from odscen.base.shown import shown_id
 from odscen.convert.verify.fidelity_result import NEAR, SignalCoverage
 from odscen.convert.verify.polyline_finder import Polylines
 from odscen.opendrive.objects import signal_kind
+from odscen.opendrive.road_model import DRIVABLE_TYPES, lane_use
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from odscen.base.ids import LaneKey
     from odscen.convert.verify.net_reader import NetFile, NetFileLink
     from odscen.convert.verify.polyline_finder import Finder
-    from odscen.opendrive.road_model import OpenDrive
+    from odscen.opendrive.road_model import OpenDrive, Road
 
 _PLACE_STEP = 1.0
 
@@ -90,7 +91,21 @@ class _StatedLights:
         for signal_id, junction in _named_by_controllers(odr):
             if signal_id in names:
                 homes[names[signal_id]].add(junction)
-        return cls(_lit_junctions(odr, roads), dict(roads), homes)
+        # Where no vehicle drives SUMO has nothing that a light could control.
+        driven = {road.id for road in odr.roads.values() if _has_vehicles(road)}
+        stated = {
+            name: own for name, own in roads.items() if homes[name] or not own.isdisjoint(driven)
+        }
+        return cls(_lit_junctions(odr, roads), stated, homes)
+
+
+def _has_vehicles(road: Road) -> bool:
+    return any(
+        lane_use(lane) in DRIVABLE_TYPES
+        for section in road.sections
+        for lane in section.lanes.values()
+        if lane.id
+    )
 
 
 def _named_by_controllers(odr: OpenDrive) -> Iterator[tuple[str, str]]:

@@ -9,6 +9,7 @@ goes on waiting.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from odscen.records.outcomes import StopReason
@@ -31,7 +32,7 @@ PERIOD = 5.0
 
 
 class MissedLanes:
-    """Gives other routes; nothing is kept between two looks, nor between slices of a run.
+    """Gives other routes, to no driver twice within :data:`PATIENCE`; slices of a run forget them.
 
     Parameters
     ----------
@@ -41,6 +42,7 @@ class MissedLanes:
 
     def __init__(self, net_offset: tuple[float, float]) -> None:
         self._offset = net_offset
+        self._changed: dict[str, float] = {}
 
     def due(self, begin: float, length: float) -> bool:
         """Whether to look before the step from ``begin`` that lasts ``length`` (s)."""
@@ -66,7 +68,7 @@ class MissedLanes:
         events = []
         for stopped in session.stopped.longer_than(PATIENCE):
             name = stopped.vehicle
-            if name in moved:
+            if name in moved or time - self._changed.get(name, -PATIENCE) < PATIENCE:
                 continue
             view = session.stopped.ahead(name)
             if view is None or view.onwards or view.beside is None:
@@ -75,6 +77,7 @@ class MissedLanes:
             front = session.vehicle_front(name)
             if route is None or not session.set_route(name, route):
                 continue
+            self._changed[name] = time
             dx, dy = self._offset
             events.append(
                 Event(
@@ -96,30 +99,41 @@ def _find_route(
 ) -> tuple[str, ...] | None:
     """Quickest route that a lane leads onto, by all stops; ``None`` if none leads to the goal.
 
-    The lane has to lead over two edges: SUMO looks further than one for the lane that it wants.
+    Where the vehicle's own lane leads nowhere, that of the nearest lane from which one does.
     """
     vclass = session.vehicle_class(name)
     ahead = session.route_ahead(name)
     shut = closed.get(vclass, frozenset())
-    if not ahead.edges or ahead.inside:
+    if len(ahead.edges) < 2 or ahead.inside:
+        return None
+    onwards = {edge for _, edge in session.lanes.onwards(lane, vclass)}
+    if ahead.edges[1] in onwards and session.stopped.is_at_red(name):
         return None
     here, goals = ahead.edges[0], (*session.stop_edges(name), ahead.edges[-1])
-    found: list[tuple[str, ...]] = []
-    for lane_after, edge in session.lanes.onwards(lane, vclass):
-        if (here, edge) in shut:
+    lanes = session.lanes.in_order(here)
+    own = lanes.index(lane)
+    for start in sorted(lanes, key=lambda other: (abs(lanes.index(other) - own), other)):
+        routes = []
+        for part in _parts_from(session, start, vclass, goals[0]):
+            steps = (here, *part)
+            rest = detours.by_stops(part[-1], goals, vclass, shut)
+            if rest is not None and shut.isdisjoint(pairwise(steps)):
+                routes.append((*steps, *rest[1:]))
+        others = [route for route in routes if route[1:3] != ahead.edges[1:3]]
+        if others:
+            return min(others, key=lambda route: (detours.seconds(route, vclass), route))
+    return None
+
+
+def _parts_from(session: Session, lane: str, vclass: str, goal: str) -> list[tuple[str, ...]]:
+    """Two edges that a lane leads over, or one if that is the goal.
+
+    Two, as SUMO looks further than one for the lane that it wants.
+    """
+    parts: set[tuple[str, ...]] = set()
+    for after, edge in session.lanes.onwards(lane, vclass):
+        if edge == goal:
+            parts.add((edge,))
             continue
-        if edge == goals[0]:
-            found.append((here, edge))
-            continue
-        found += [
-            (here, edge, second)
-            for _, second in session.lanes.onwards(lane_after, vclass)
-            if (edge, second) not in shut
-        ]
-    routes = []
-    for start in sorted(set(found)):
-        rest = detours.by_stops(start[-1], goals, vclass, shut)
-        if rest is not None:
-            routes.append((*start, *rest[1:]))
-    routes = [route for route in routes if route != ahead.edges]
-    return min(routes, key=lambda route: (detours.seconds(route, vclass), route), default=None)
+        parts.update((edge, second) for _, second in session.lanes.onwards(after, vclass))
+    return sorted(parts)

@@ -72,6 +72,11 @@ class StoppedVehicles:
         people = bool(link[3]) and self._people_cross(link[4])
         return ViewAhead(True, str(link[5]), bool(link[2]), leader, people)
 
+    def is_at_red(self, name: str) -> bool:
+        """Whether the next light that a vehicle comes to shows red."""
+        links = self._sumo.vehicle.getNextLinks(name)
+        return bool(links) and links[0][5] in _RED
+
     def _leads_astray(self, name: str) -> bool | None:
         """Whether another lane continues along a vehicle's route; ``None`` if its own lane does."""
         vehicle, lanes = self._sumo.vehicle, self._sumo.lane
