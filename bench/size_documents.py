@@ -261,6 +261,35 @@ def criteria(document: Document, number: int) -> Document:
     return document | {"criteria": ["collisions == 0"] * min(number, 200)}
 
 
+def _edits_of_measures(document: Document, number: int) -> list[Document]:
+    measures_of = measures(document, number)["measures"]
+    return [{"kind": "set_measure", "measure": one} for one in measures_of]
+
+
+def _edits_of_an_actor(document: Document, number: int) -> list[Document]:
+    actor = document["actors"][0]["id"]
+    return [{"kind": "change_actor", "actor": actor, "speed": 5.0 + n % 7} for n in range(number)]
+
+
+def _edits_of_flows(document: Document, number: int) -> list[Document]:
+    """One flow after another from one node; the first is refused where others start."""
+    start, _ = _road_nodes(document)
+    return [{"kind": "add_flow", "spawn": start, "per_hour": 1.0} for _ in range(number)]
+
+
+def _edits_of_parameters(_document: Document, number: int) -> list[Document]:
+    return [{"kind": "set_parameter", "parameter": f"p{n}", "value": 1.0} for n in range(number)]
+
+
+EDITS: dict[str, Callable[[Document, int], list[Document]]] = {
+    "edits of measures": _edits_of_measures,
+    "edits of one actor": _edits_of_an_actor,
+    "edits of flows": _edits_of_flows,
+    "edits of parameters": _edits_of_parameters,
+}
+"""Edits of one request, each for so many."""
+
+
 def region(document: Document, number: int) -> Document:
     """Segments that the map does not have."""
     return document | {"roi": [*document["roi"], *(f"r-{n}" for n in range(number))]}

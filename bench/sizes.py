@@ -1,8 +1,9 @@
 """How what commands and routes take grows with the size of what they are given.
 
-``python -m bench sizes [--kinds KIND...] [--of check run routes import sweep]``: scenarios on the
-shipped crossing with 1, 2, 4 and 8 times as many parts of one kind (``bench/size_documents.py``),
-tables of as many rows and grids of as many cases. CPU seconds of a command with all that it starts,
+``python -m bench sizes [--kinds KIND...] [--of check run routes edits import sweep]``: scenarios on
+the shipped crossing with 1, 2, 4 and 8 times as many parts of one kind
+(``bench/size_documents.py``), tables of as many rows, as many edits of one request, and grids of as
+many cases. CPU seconds of a command with all that it starts,
 and of the server while it answers a request; the exponent is that of the growth from the smallest
 to the largest, without what the same takes with the scenario itself. ``/api/health`` is asked for
 all the time while the server works, and is too slow if the server has computed that long.
@@ -91,6 +92,8 @@ TABLES: dict[str, tuple[str, str]] = {
     "counts": ("place,begin,end,count", "{segment},{begin},{end},3"),
 }
 ROWS = 500
+EDITS = 625
+"""Of one request; eight times as many are the most that it may have."""
 CASES = 5000
 
 
@@ -106,7 +109,10 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="bench sizes")
     options.add_argument("--kinds", nargs="+", choices=list(KINDS), default=list(KINDS))
     options.add_argument(
-        "--of", nargs="+", default=["check", "run", "routes", "import", "sweep"], metavar="WHAT"
+        "--of",
+        nargs="+",
+        default=["check", "run", "routes", "edits", "import", "sweep"],
+        metavar="WHAT",
     )
     asked = options.parse_args()
     print(
@@ -138,16 +144,19 @@ def main() -> None:
         if "sweep" in asked.of:
             work = [commands.sweep(base, max(n, 2)) for n in sizes(CASES)]
             show("cases", "`sweep --dry-run`", CASES, work)
-        if "routes" in asked.of:
+        if {"routes", "edits"} & set(asked.of):
             with tool.served(workspace.root) as server:
                 routes = Routes(server.url.removeprefix("http://"), server.process.pid)
-                for kind in asked.kinds:
+                for kind in asked.kinds if "routes" in asked.of else ():
                     grow, number = KINDS[kind]
                     documents = [base, *(grow(base, number * factor) for factor in FACTORS)]
                     rows = list(zip(*map(routes.use, documents), strict=True))
                     for label, measured in zip(Routes.LABELS, rows, strict=True):
                         show(kind, label, number, measured)
-                for table, (head, row) in TABLES.items():
+                for kind, made in grown.EDITS.items() if "edits" in asked.of else ():
+                    work = [routes.edits(base, made(base, n)) for n in sizes(EDITS)]
+                    show(kind, "POST edits", EDITS, work)
+                for table, (head, row) in TABLES.items() if "routes" in asked.of else ():
                     content = tables(base, head, row)
                     work = [routes.table(base, table, content(n)) for n in sizes(ROWS)]
                     show(f"rows of a table: {table}", "POST demand/table", ROWS, work)
@@ -261,6 +270,14 @@ class Routes:
         yield self._asked("GET", own, None, None, size)
         yield self._asked("POST", f"{own}/edits", edit, "application/json", size)
         yield self._asked("GET", f"{own}/plan", None, None, size)
+
+    def edits(self, document: grown.Document, edits: list[grown.Document]) -> Measured:
+        """All in one request; one that takes too long is refused as a whole."""
+        for _ in self.use(document):
+            pass
+        body = json.dumps({"version": 2, "edits": edits}).encode()
+        path = f"/api/scenarios/size-{self._number}/edits"
+        return self._asked("POST", path, body, "application/json", len(body))
 
     def table(self, document: grown.Document, kind: str, content: str) -> Measured:
         for _ in self.use(document):

@@ -14,6 +14,8 @@ Generator = np.random.Generator
 Change = Callable[[bytes, Generator], bytes]
 
 DEEP = 100_000
+_MOST_ADDED = 5_000_000
+"""Bytes: what is made here is in the memory of each command that is forked."""
 LONG_CELL = 131_073
 """One more character than Python's csv module takes in a field unless told otherwise."""
 NUMBERS = (
@@ -287,7 +289,8 @@ def _semicolons(data: bytes, _rng: Generator) -> bytes:
 
 def _many_rows(data: bytes, _rng: Generator) -> bytes:
     lines = data.splitlines(keepends=True)
-    return data + b"".join(lines[1:2]) * 20_000
+    more = b"".join(lines[1:2])
+    return data + more * min(20_000, _MOST_ADDED // max(len(more), 1))  # one may be long by now
 
 
 CSV: dict[str, Change] = {

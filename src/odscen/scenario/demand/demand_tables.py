@@ -177,7 +177,7 @@ def read_profile(text: str) -> ProfileTable:
         return ProfileTable(shares, None, None)
     begins = [line.time("time", 0.0) for line in lines]
     if len(lines) == 1:
-        problem = "one slice has no length that its time tells; a whole day has no times"
+        problem = "one slice has no length that its time would give; a whole day has no times"
         raise InputError(problem, element=lines[0].where)
     length = begins[1] - begins[0]
     if length <= 0:
