@@ -35,7 +35,13 @@ def write_sumo_files(source: ExportSource) -> ExportFiles:
 
 
 def choose_configuration(files: Sequence[GivenFile]) -> int:
-    """Of the files of a project the configuration, or else the network."""
+    """Of the files of a project the configuration, or else the network.
+
+    Raises
+    ------
+    InputError
+        If there is neither.
+    """
     for ending in (".sumocfg", ".sumo.cfg", ".net.xml", ".net.xml.gz"):
         for index, file in enumerate(files):
             if file.name.lower().endswith(ending):

@@ -118,6 +118,8 @@ def evaluate_signals(
 
     Parameters
     ----------
+    workspace
+        Has the map.
     scenario
         The scenario, or its file, with the programs that are evaluated; it is not changed.
     today
@@ -126,6 +128,13 @@ def evaluate_signals(
         Of the runs of each side, of which pairs are made.
     processes
         Runs at a time.
+    reporter
+        Hears of each run.
+
+    Returns
+    -------
+    SignalEvaluation
+        Both sides, their difference with its interval, and one sentence.
 
     Raises
     ------

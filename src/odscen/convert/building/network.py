@@ -57,7 +57,8 @@ if TYPE_CHECKING:
     from odscen.convert.model.edge_plan import EdgePlan, RoadGap
     from odscen.convert.model.lane_alignment import LaneAlignment, Line
     from odscen.convert.pedestrian.pedestrian_network import WalkNet
-    from odscen.convert.signals.map_signals import Acting, SignalControl
+    from odscen.convert.signals.acting_signals import Acting
+    from odscen.convert.signals.map_signals import SignalControl
     from odscen.convert.signals.road_lights import RoadStop
     from odscen.lanegraph.graphs import PedestrianGraph
     from odscen.opendrive.lanes import RoadTable

@@ -8,12 +8,13 @@ controls the connections that run over it; on any other road it controls the nex
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from odscen.base.shown import shown_id
 from odscen.convert.model.right_of_way import Sign, wrapped
+from odscen.convert.signals.acting_signals import Acting, SettledSignal
 from odscen.convert.signals.road_lights import REACH, RoadLights
 from odscen.opendrive.objects import signal_kind
 from odscen.opendrive.sign_catalogue import sign_meaning
@@ -26,9 +27,10 @@ if TYPE_CHECKING:
     from odscen.convert.model.connections import PlannedConnection
     from odscen.convert.model.edge_plan import EdgePlan
     from odscen.convert.model.lane_alignment import LaneAlignment
+    from odscen.convert.signals.acting_signals import SignalReach
     from odscen.convert.signals.road_lights import RoadStop, StandingLight
     from odscen.opendrive.lanes import RoadTable
-    from odscen.opendrive.road_model import OpenDrive, Signal, SignalReference, Validity
+    from odscen.opendrive.road_model import OpenDrive, Signal, SignalReference
 
 
 STANDS_NEAR = 20.0
@@ -49,60 +51,6 @@ WHOLE_JUNCTION = (
 )
 
 _FLIPPED = {"+": "-", "-": "+"}
-
-
-class Acting(NamedTuple):
-    """One place where a signal acts; ``element`` is the signal's own, for the report."""
-
-    signal: str
-    element: str
-    kind: str
-    road: RoadId
-    s: float
-    orientation: str
-    validities: tuple[Validity, ...]
-
-    def applies_to(self, lane_id: int) -> bool:
-        """Whether it is valid for a lane; without validity it is for all."""
-        if not self.validities:
-            return True
-        return any(
-            min(v.from_lane, v.to_lane) <= lane_id <= max(v.from_lane, v.to_lane)
-            for v in self.validities
-        )
-
-    def faces(self, *, growing: bool) -> bool:
-        """Whether it faces traffic that runs with growing s, or else against it.
-
-        Where a validity names lanes, these decide: tools write the orientation of the pole.
-        """
-        if self.validities:
-            return True
-        return {"+": growing, "-": not growing}.get(self.orientation, True)
-
-
-class SignalReach(Protocol):
-    """How signals and movements (their numbers) lie to each other."""
-
-    def controls(self, place: Acting) -> list[int]:
-        """Movements that a signal at a place controls, by its orientation and validity."""
-
-    def distance(self, place: Acting, *, growing: bool) -> float:
-        """Metres from a place to the next junction along or against s; infinite if there is none.
-
-        Infinite also for places on connecting roads.
-        """
-
-    def before(self, place: Acting, home: AbstractSet[int]) -> list[int]:
-        """Movements of a junction that come straight towards a place behind it."""
-
-
-class SettledSignal(NamedTuple):
-    """What a signal controls at one place; ``guess`` says why, if not because it is written so."""
-
-    place: Acting
-    numbers: tuple[int, ...]
-    guess: str = ""
 
 
 def signal_homes(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from odscen.base.ids import RoadId
     from odscen.convert.model.connections import PlannedConnection
     from odscen.convert.model.edge_plan import EdgePlan
-    from odscen.convert.signals.map_signals import Acting, SettledSignal, SignalReach
+    from odscen.convert.signals.acting_signals import Acting, SettledSignal, SignalReach
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import OpenDrive, Road
 

@@ -39,7 +39,10 @@ class KeyedLane(NamedTuple):
 
 @dataclass(slots=True)
 class PlannedSection:
-    """A stretch of a road with the same lanes, as :class:`CrossSection` has them."""
+    """A stretch of a road with the same lanes.
+
+    They are those of a :class:`~odscen.maps.importers.osm.street_tags.CrossSection`.
+    """
 
     s: float
     s_end: float
