@@ -274,6 +274,39 @@ def render(
 
 
 @app.command()
+def export(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="File ending in .osm.", metavar="FILE")],
+    origin: Annotated[
+        str,
+        typer.Option(
+            help="Latitude and longitude of x = y = 0, of a map without a projection.",
+            metavar="LAT,LON",
+        ),
+    ] = "",
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a map as Lanelet2, for Autoware and other programs that read it."""
+    from odscen.base.text_files import write_file
+    from odscen.maps.lanelet2_export import export_lanelet2
+    from odscen.maps.store import Workspace
+    from odscen.opendrive.parse import parse
+
+    entry = Workspace.open(workspace).map(name)
+    if out.suffix.lower() != ".osm":
+        raise InputError(f"{out.name} does not end in .osm, as Lanelet2 files do")
+    found = export_lanelet2(parse(entry.read("xodr"), file="map.xodr"), origin=origin)
+    write_file(out, found.osm)
+    for row in found.entries:
+        log(f"{row.outcome.value}: {row.element}: {row.reason}")
+    log(f"Wrote {out}")
+    if as_json:
+        rows = [row.to_dict() for row in found.entries]
+        print_json({"name": name, "file": str(out), "entries": rows})
+
+
+@app.command()
 def verify(
     name: Annotated[str, typer.Argument(metavar="NAME")],
     drawing: Annotated[

@@ -216,8 +216,13 @@ def test_time_lost_on_all_stretches_is_that_of_tripinfo_for_each_vehicle(run):
     ours = run.stretches.group_by("id").agg(pl.sum_horizontal(parts).sum().alias("ours"))
     both = ours.join(run.trips.select("id", "time_loss"), on="id")
     assert both.height == NUMBER
-    assert both["ours"].sum() == pytest.approx(both["time_loss"].sum(), rel=CLOSE)
-    assert (both["ours"] - both["time_loss"]).abs().max() < 0.5
+    assert both["ours"].sum() == pytest.approx(both["time_loss"].sum(), rel=2.0 * CLOSE)
+    # Trucks, every eighth, are slower in turns by restrictions of edge types, which are not in the
+    # limits of lanes: for SUMO they lose less.
+    heavy = both["id"].str.slice(1).cast(int) % 8 == 0
+    error = both["ours"] - both["time_loss"]
+    assert error.filter(~heavy).abs().max() < 0.5
+    assert 0.0 <= error.filter(heavy).max() < 2.0
 
 
 def test_control_delay_is_what_a_detector_around_the_junction_measures_but_for_the_cruise(run):

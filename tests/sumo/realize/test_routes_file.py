@@ -59,6 +59,7 @@ def segment(name: str, node: str | None) -> str:
 
 def with_matrix(*trips: tuple[str, str, float], **fields: Any) -> Scenario:
     graph = built(CROSSING).sumo.graph
+    fields = {"arrivals": "even", **fields}
     return set_matrix(empty(CROSSING), graph, matrix="od", trips=trips, **fields)
 
 
@@ -103,7 +104,8 @@ def test_trips_without_a_way_are_told_and_not_made() -> None:
     onwards = transitions(graph)
     last = next(n for n in arms("motorway_weave") if not onwards.get(n))
     first = next(n for n in arms("motorway_weave") if n != last)
-    scenario = set_matrix(scenario, graph, matrix="back", trips=[(last, first, 7)])
+    trips = [(last, first, 7)]
+    scenario = set_matrix(scenario, graph, matrix="back", trips=trips, arrivals="even")
     done = realize(scenario, built("motorway_weave").sumo)
     assert done.plan.actors == ()
     assert any("7 trips left out" in note for note in done.notes)

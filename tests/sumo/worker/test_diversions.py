@@ -234,6 +234,7 @@ def test_a_sliced_run_that_is_killed_while_measures_act_ends_with_the_same_bytes
         assert results(run) == results(alone.folder)
     shut = Ended(workspace, one, tmp_path / "again", slice_length=120.0)
     started = {actor.id for actor in shut.outcomes.values() if actor.spawn.startswith("25.")}
+    started |= shut.on(town, "r25", 0.0, 90.0)  # who was there when it was closed drives out
     assert shut.on(town, "r25", 150.0, 250.0) <= started  # closed on both sides of a boundary
     speeds = shut.rows.filter(
         pl.col("vehicle_lane").is_in(

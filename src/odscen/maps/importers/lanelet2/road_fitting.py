@@ -417,6 +417,11 @@ def fit_cubics(
     ----------
     floor
         Whether they must not fall below zero: near it they are straight.
+
+    Raises
+    ------
+    AssertionError
+        Never: through two values there is a line.
     """
     records = []
     first, last = 0, s.size - 1
