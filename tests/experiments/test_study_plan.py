@@ -8,6 +8,7 @@ import pytest
 
 from odscen.base.errors import ConflictError, InputError, ScenarioError
 from odscen.experiments.plan import StudyPlan, found_sources, grid_of, read_study_plan, refuse_other
+from odscen.experiments.studies import begin_study
 from odscen.scenario.document.problems import validated
 from tests.experiments.study_case import WARM, place, plan_file
 
@@ -149,3 +150,9 @@ def test_an_absolute_pattern_is_of_files_as_a_relative_one_is(tmp_path: Path) ->
 def test_what_is_no_pattern_is_named(pattern: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is no pattern of files"):
         grid(tmp_path, scenarios=[pattern])
+
+
+@pytest.mark.parametrize("pattern", [".", "/"])
+def test_patterns_that_no_file_can_match_are_refused_in_words(tmp_path: Path, pattern: str) -> None:
+    with pytest.raises(InputError, match="scenarios: no file matches"):
+        begin_study(place(), plan_file(tmp_path, scenarios=[pattern]), tmp_path / "study")
