@@ -368,9 +368,9 @@ def test_half_a_second_between_records_is_bridged_and_said(
     both = exact.valid & bridged.valid
     assert both.sum() > 0.9 * exact.valid.sum()
     off = np.hypot(exact.x - bridged.x, exact.y - bridged.y)[both]
-    # Turns and braking; beyond that lie lane changes, which SUMO makes in one step of the run.
+    # Turns, braking and lane changes, which take three seconds: none is a step aside.
     assert np.quantile(off, 0.99) < 0.35
-    assert 0.5 < off.max() < 3.5
+    assert 0.0 < off.max() < 0.5
     assert off.mean() < 0.06
 
 

@@ -14,7 +14,7 @@ def test_a_suite_expects_the_criteria_of_its_scenarios_unless_it_says_otherwise(
     edit_json(suite.parent / "one.scenario.json", criteria=["collided == 0", "sim_seconds <= 10 s"])
     (case,) = run_suite(store, read_suite(suite)).cases
     assert case.status.value == "failed"
-    assert list(case.problems) == ["seed 1: Simulated time: at most 10 s, but it is 19.5 s"]
+    assert list(case.problems) == ["seed 1: Simulated time: at most 10 s, but it is 20 s"]
     suite.write_text("criteria = false\n" + text)
     (case,) = run_suite(store, read_suite(suite)).cases
     assert case.status.value == "passed"

@@ -415,12 +415,16 @@ def _link_numbers(text: str) -> tuple[int, ...]:
     )
 
 
+class ParameterError(InputError):
+    """A parameter of a program is nothing that SUMO could run, whatever else is in force."""
+
+
 def _param_number(params: Mapping[str, str], key: str, default: float) -> float:
     """Seconds, above 0, that a program of SUMO has as a parameter.
 
     Raises
     ------
-    InputError
+    ParameterError
         If it is another text.
     """
     text = params.get(key)
@@ -431,5 +435,5 @@ def _param_number(params: Mapping[str, str], key: str, default: float) -> float:
     except ValueError:
         value = 0.0
     if not 0.0 < value < _LONGEST_PARAM:
-        raise InputError(f"parameter {key} is {text[:40]!r}, not a number above 0")
+        raise ParameterError(f"parameter {key} is {text[:40]!r}, not a number above 0")
     return value

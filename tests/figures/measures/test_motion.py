@@ -165,17 +165,12 @@ def test_a_recorded_speed_that_is_not_that_of_positions_is_found_for_people_as_w
 def test_turning_on_the_spot_and_driving_backwards_are_found():
     plan = planned("car", "car")
     time = np.arange(41) * 0.1
-    spin = {"time": time, "y": 50.0, "hdg": 0.4 * time, "speed": 0.0}
-    spin["x"] = np.zeros(41)
+    spin = {"time": time, "x": np.zeros(41), "y": 50.0, "hdg": 3.0 * time, "speed": 0.0}
     back = {"time": time, "x": -3.0 * time, "y": 0.0, "speed": 3.0}
     found = check_motion(table(plan, spin, back), plan)
-    assert set(zip(found["id"], found["kind"], strict=True)) == {
-        ("car-0", "recorded speed"),
-        ("car-1", "backwards"),
-    }
-    turning = {**spin, "hdg": 3.0 * time}
-    found = check_motion(table(planned("car"), turning), planned("car"))
-    assert ("yaw rate", "lane") in kinds(found)
+    pairs = set(zip(found["id"], found["kind"], strict=True))
+    assert {("car-0", "yaw rate"), ("car-1", "backwards")} <= pairs
+    assert ("car-1", "yaw rate") not in pairs
 
 
 def test_bodies_that_overlap_and_bodies_off_the_road_are_found_with_their_partner():

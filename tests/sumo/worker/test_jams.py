@@ -121,7 +121,7 @@ def test_a_light_that_never_turns_green_is_named_with_place_and_time(
         assert teleported["until"] - teleported["time"] == pytest.approx(300.0, abs=1.0)
 
 
-def test_a_vehicle_that_cannot_get_to_its_lane_is_told_from_one_at_a_red_light(
+def test_a_vehicle_that_cannot_get_to_its_lane_takes_another_route_and_is_no_jam(
     prepare: Prepare, tmp_path: Path
 ) -> None:
     """The left lane is full of parked cars, and the one on the right is to turn left."""
@@ -138,6 +138,11 @@ def test_a_vehicle_that_cannot_get_to_its_lane_is_told_from_one_at_a_red_light(
     run = prepare(cars=1, walker=False, routes=f"<routes>{TYPES}\n{parked}\n{left}\n</routes>")
     result = run_prepared(replace(run, plan=replace(run.plan, until=260.0)), tmp_path / "run")
     assert result.status == "completed", result.summary["error"]
-    (place,) = result.summary["gridlock"]["places"]
-    assert (place["kind"], place["actor"]) == ("jam", "car0")
-    assert place["reason"] == StopReason.WRONG_LANE
+    events = events_from_json((tmp_path / "run" / "events.json").read_text())
+    found = [event for event in events if event.kind is EventKind.ROUTE_CHANGED]
+    # Around the block there is no other way than back to the same lane.
+    assert {(event.actor, event.lane, event.detail) for event in found} == {
+        ("car0", "A1B1_1", StopReason.WRONG_LANE)
+    }
+    assert found[0].waited == pytest.approx(60.0, abs=1.0)
+    assert result.summary["gridlock"]["places"] == []

@@ -177,7 +177,7 @@ def take_signals(
     """
     from odscen.formats.tll_file import parse_signal_file
     from odscen.formats.tll_loops import taken_loops
-    from odscen.formats.tll_program import taken_timing
+    from odscen.formats.tll_program import ParameterError, taken_timing
 
     loaded = map_of(workspace, scenario)
     views = {light.id: view for light, view in zip(loaded.sumo.lights, loaded.lights, strict=True)}
@@ -206,6 +206,8 @@ def take_signals(
                 timing, more = taken_timing(views[light.id], plans, loops=loops)
                 own = changed_part(scenario.signals, {"junctions": (timing,)})
                 refuse_errors(signal_problems(own, loaded.lights))
+            except ParameterError:
+                raise
             except InputError as error:
                 states = [phase.state for plan in plans for phase in plan.program.phases]
                 fits = {len(state) for state in states} == {len(light.phases[0].state)}

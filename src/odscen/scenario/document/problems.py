@@ -64,8 +64,10 @@ def _format_location(location: Iterable[str | int]) -> str:
     place = ""
     for step in location:
         # Names of fields that are not known are those of the file, however long.
-        name = f"[{step}]" if isinstance(step, int) else printable(step[:_SHOWN])
-        place += f".{name}" if place and not name.startswith("[") else name
+        if isinstance(step, int):
+            place += f"[{step}]"
+        else:
+            place += f".{printable(step[:_SHOWN])}" if place else printable(step[:_SHOWN])
     return place
 
 

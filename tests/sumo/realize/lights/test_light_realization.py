@@ -176,7 +176,7 @@ def test_an_arrow_comes_on_call_for_who_found_no_gap_in_oncoming_traffic(tmp_pat
     lefts = only_from(0, "4.0.1.64", control="fixed")
     assert "2" not in stages(shown(tmp_path / "alone", lefts))
     oncoming = only_from(2, "1.0.1.64", control="fixed").flows[0]
-    busy = oncoming.model_copy(update={"per_hour": 900.0})
+    busy = oncoming.model_copy(update={"per_hour": 1200.0})
     seen = shown(tmp_path / "busy", lefts.model_copy(update={"flows": (*lefts.flows, busy)}))
     assert 2 <= stages(seen).count("2") < stages(seen).count("1")
 
