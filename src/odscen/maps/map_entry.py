@@ -228,7 +228,8 @@ class MapEntry:
 
         odr = parse(self.read("xodr"), file=self.path("xodr").name)
         with in_file(self.path("net").name):
-            offset = self.lane_table().net_offset
+            # One that was brought in may state another offset than the map's; one of ours must not.
+            offset = self.lane_table().net_offset if self.converter == "file" else None
             return verify(self.read("net"), odr, RoadTable.of(odr), offset=offset)
 
     def statistics(self) -> MapStatistics:
