@@ -58,7 +58,7 @@ def test_seeds_are_added_until_the_interval_is_narrow_or_the_most_are_run(
     assert wide.code == 0, wide.err
     assert found["seeds"] == 5
     assert found["half_width"] <= 0.6 * found["mean"]
-    few = ("--most-seeds", "6", "--until", "120")
+    few = ("--most-seeds", "6", "--until", "120", "--overwrite")
     narrow = odscen("run", file, "--until-confident", "5 %", *few, *usual)
     (found,) = narrow.json["confidence"]
     assert narrow.code == 1

@@ -152,7 +152,7 @@ def test_what_is_no_pattern_is_named(pattern: str, tmp_path: Path) -> None:
         grid(tmp_path, scenarios=[pattern])
 
 
-@pytest.mark.parametrize("pattern", [".", "/"])
+@pytest.mark.parametrize("pattern", [".", "./", "/"])
 def test_patterns_that_no_file_can_match_are_refused_in_words(tmp_path: Path, pattern: str) -> None:
     with pytest.raises(InputError, match="scenarios: no file matches"):
         begin_study(place(), plan_file(tmp_path, scenarios=[pattern]), tmp_path / "study")

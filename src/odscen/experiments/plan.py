@@ -378,12 +378,10 @@ def _of_files(plan: StudyPlan, workspace: Workspace, beside: Path) -> Iterator[S
 def _matching_files(beside: Path, pattern: str) -> list[Path]:
     """Files of a pattern that is relative to a folder, or absolute."""
     path = PurePath(pattern)
-    try:
-        if path.is_absolute():
-            return sorted(Path(path.anchor).glob(str(path.relative_to(path.anchor))))
-        return sorted(beside.glob(pattern))
-    except (ValueError, IndexError, NotImplementedError, OSError):
-        return []  # "." and "/" have no part that files could match
+    if not path.name:
+        return []  # ".", "./" and "/" have no part that files could match
+    root = Path(path.anchor) if path.is_absolute() else beside
+    return sorted(root.glob(str(path.relative_to(path.anchor))))
 
 
 def refuse_unknown_parameters(

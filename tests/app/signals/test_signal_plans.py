@@ -311,7 +311,9 @@ def test_the_program_of_the_guide_runs_on_a_network_by_netconvert_too(
     done = run(by_netconvert, one, name="guide", out=tmp_path / "runs")
     counts = done.summary["actors"]
     assert done.status == "completed"
-    assert counts["inserted"] == counts["planned"] > 200
+    # Who is due just before the end may still wait for a gap to enter.
+    assert counts["planned"] - 2 <= counts["inserted"] <= counts["planned"]
+    assert counts["planned"] > 200
     assert counts["arrived"] > 0.8 * counts["planned"]
     assert (counts["teleported"], counts["collided"]) == (0, 0)
     log = (done.folder / "sumo.log").read_text()
