@@ -151,7 +151,8 @@ def wrong_in_imported_table(kind: str, table: Path, scenario: Path) -> str:
     if kind != "profile" and not {"trips", "count", "zone"} & set(head.split(separator)):
         return ""  # written in another way, of which this knows nothing
     lines = csv.DictReader(io.StringIO(text), delimiter=separator)
-    rows = [row for row in lines if any(row.values())]
+    # A quote that nothing closes leaves a row of white space, which is none.
+    rows = [row for row in lines if "".join(map(str, filter(None, row.values()))).strip()]
     if kind == "od":
         given = sum(float(row["trips"].replace(",", ".")) for row in rows)
         read = sum(trips for matrix in demand.matrices for _, _, trips in matrix.trips)
