@@ -1691,6 +1691,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "{kept} of {crosswalks} crosswalks are crossings" }),
   msg({ message: "{kept} of {relations} relations between lanes of roads" }),
   msg({ message: "{kept} places of road users were recorded; a file has 1 to {most_points}" }),
+  msg({ message: "{key} is given twice in one place" }),
   msg({ message: "{key}={value}: it has no counterpart, or another tag says it" }),
   msg({ message: "{key}={value}: the OSM way is inside a junction" }),
   msg({ message: "{kind} is for {who}; {actor} is a {category}" }),

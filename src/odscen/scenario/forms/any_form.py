@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import json
+from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import ScenarioError
+from odscen.base.shown import printable
 from odscen.scenario.document.json_form import loads
 from odscen.scenario.forms.graph_form import from_graphml
 
@@ -38,4 +40,21 @@ def read_any(text: str | bytes, *, file: str | None = None) -> Scenario:
     start = decoded.removeprefix("\ufeff").lstrip()
     if start.startswith("<"):
         return from_graphml(start, file=file)
-    return loads(start, file=file)
+    scenario = loads(start, file=file)
+    _refuse_doubled_keys(start, file)
+    return scenario
+
+
+def _refuse_doubled_keys(text: str, file: str | None) -> None:
+    """Refuse an object that has a key twice: of the two values one would be lost in silence."""
+
+    def refuse(pairs: list[tuple[str, Any]]) -> None:
+        seen: set[str] = set()
+        for key, _ in pairs:
+            if key in seen:
+                raise ScenarioError(
+                    f"{printable(key[:60])!r} is given twice in one place", file=file
+                )
+            seen.add(key)
+
+    json.loads(text, object_pairs_hook=refuse)
