@@ -100,3 +100,16 @@ def test_foreign_files_are_refused(text: str) -> None:
     for reader in (Plan.from_json, events_from_json, actors_from_json):
         with pytest.raises(InputError):
             reader(text)
+
+
+def test_a_trip_that_is_told_after_the_arrival_counts() -> None:
+    """SUMO tells the trip of a car that ends in a parking place when that leaves it."""
+    actors = plan(planned("a"))
+    outcomes = Outcomes(actors)
+    outcomes.hear([event for event in EVENTS if event.actor == "a"])
+    outcomes.settle()
+    outcomes.hear((), {"a": TRIPS["a"]})
+    outcomes.settle()
+    (row,) = outcomes.rows()
+    assert row == outcome_row(actor_outcomes(actors, EVENTS, TRIPS)[0])
+    assert '"delay": 4.5' in row

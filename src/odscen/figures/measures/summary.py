@@ -146,9 +146,14 @@ class Outcomes:
         self._trips.update(trips)
 
     def settle(self) -> None:
-        """Write down who has arrived: nothing more happens to them, and :meth:`rows` is quicker."""
+        """Write down who has arrived: nothing more happens to them, and :meth:`rows` is quicker.
+
+        Not yet those whose trip has not come: of a car that ends in a parking place SUMO writes it
+        when that leaves the place, perhaps slices later.
+        """
         for name, history in self._histories.items():
-            if history.arrival is not None and name in self._actors and name not in self._rows:
+            settled = history.arrival is not None and name in self._trips
+            if settled and name in self._actors and name not in self._rows:
                 self._rows[name] = outcome_row(self._outcome_of(name))
 
     def outcomes(self) -> tuple[ActorOutcome, ...]:
