@@ -88,8 +88,8 @@ def test_a_long_run_inserts_everybody_and_leaves_a_folder_like_any_other(
     assert [one["time"] for one in result.summary["slices"]["done"]][:2] == [60.0, 120.0]
     left = {path.name for path in result.folder.iterdir()}
     assert left == {
-        "SHA256SUMS", "actors.json", "events.json", "figures", "lanes", "plan.json", "scenario.json",
-        "summary.json", "sumo", "sumo.log", "trajectories", "trips",
+        "SHA256SUMS", "actors.json", "events.json", "figures", "lanes", "plan.json",
+        "scenario.json", "summary.json", "sumo", "sumo.log", "trajectories", "trips",
     }  # fmt: skip
     assert all(path.exists() for path in map(Path, result.to_dict()["files"].values()))
 
