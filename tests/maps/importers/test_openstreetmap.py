@@ -37,7 +37,7 @@ from odscen.maps.store import Workspace
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import DRIVABLE_TYPES, OpenDrive
 
-PLACES = Path("/work/shared/places/osm")
+PLACES = Path(__file__).parents[4] / "shared" / "places" / "osm"
 EXTRACTS = sorted(PLACES.glob("*.osm*"))
 DEGREE = 111_195.0
 """Metres of a degree of latitude, about."""
