@@ -194,7 +194,7 @@ def test_cars_wait_for_red_and_go_with_green() -> None:
     ]
     run = drive(made, *cars, until=1200.0)
     assert run.arrived == {car.id for car in cars}
-    # Of 48 cars two that turn left towards each other brake late; nothing else is said.
+    # Of 48 cars two that turn into one exit, left and right, come there at once and brake late.
     warnings = run.said.splitlines()
     assert all("performs emergency braking" in line for line in warnings)
     assert len(warnings) <= 2
