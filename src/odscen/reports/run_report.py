@@ -335,6 +335,12 @@ MOST_MOTIONS = 20
 """Findings of the check of motion that are listed."""
 
 
+def _value_of_motion(row: Mapping[str, Any]) -> str:
+    """Value of a finding with its unit as it is printed."""
+    unit = KIND_UNITS[MotionKind(row["kind"])].replace("s2", "s²").replace("s3", "s³")
+    return f"{number(row['value'], 2)} {unit}"
+
+
 def motion_values(found: pl.DataFrame, values: Mapping[str, Any]) -> dict[str, Any]:
     """Findings of the check of motion: by kind, category and cause, and the worst of each kind."""
     counted = [
@@ -344,7 +350,7 @@ def motion_values(found: pl.DataFrame, values: Mapping[str, Any]) -> dict[str, A
             row["cause"],
             number(row["findings"], 0),
             number(row["users"], 0),
-            f"{number(row['value'], 2)} {KIND_UNITS[MotionKind(row['kind'])]}",
+            _value_of_motion(row),
             number(row["bound"], 2),
         )
         for row in count_by_kind(found).iter_rows(named=True)
@@ -363,7 +369,7 @@ def motion_values(found: pl.DataFrame, values: Mapping[str, Any]) -> dict[str, A
             number(row["begin"], 1),
             f"x {number(row['x'], 0)} m, y {number(row['y'], 0)} m",
             row["lane"] or "-",
-            f"{number(row['value'], 2)} {KIND_UNITS[MotionKind(row['kind'])]}",
+            _value_of_motion(row),
             row["cause"],
         )
         for row in worst.iter_rows(named=True)
