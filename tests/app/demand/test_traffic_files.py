@@ -203,7 +203,7 @@ def test_zones_of_taz_then_a_visum_matrix(
     (part,) = changed.demand.matrices
     assert (part.id, part.begin, part.end) == ("commuters", 0.0, 3600.0)
     assert part.trips == (("1", "2", 20.0), ("2", "1", 10.0))
-    assert report.left_out == [("line 6", "zone 9 is not on the map")]
+    assert report.left_out == [("row 6 of the file", "zone 9 is not on the map")]
     assert "of the trips from 06:00 to 08:00 the 50% after the start" in report.notes[0]
 
 

@@ -208,7 +208,7 @@ def put_traffic(
         If nothing of it can be used.
     """
     report = TrafficReport(read.what, rows=read.rows, columns=dict(read.columns))
-    report.left_out = [(left.where, left.reason) for left in _summed(read.left_out)]
+    report.left_out = [(left.source, left.reason) for left in _summed(read.left_out)]
     report.notes = list(read.notes)
     finder = StationFinder(loaded)
     known = {**(places or {}), **read.stations}
@@ -322,7 +322,9 @@ def _put_trips(
         ends = report.placed.get(row.origin), report.placed.get(row.destination)
         if ends[0] is None or ends[1] is None:
             missing = row.origin if ends[0] is None else row.destination
-            report.left_out.append((f"line {row.line}", f"zone {missing} is not on the map"))
+            report.left_out.append(
+                (f"row {row.line} of the file", f"zone {missing} is not on the map")
+            )
             continue
         slices[row.begin, row.end].append((ends[0], ends[1], row.trips))
     parts: dict[str, dict[str, Any]] = {}
@@ -430,7 +432,7 @@ class _VolumeWriter:
             slot = rows[found.place, begin, end]
             if row.station in slot:
                 reason = f"{row.station}: counted before, in line {slot[row.station].line}"
-                report.left_out.append((f"line {row.line}", reason))
+                report.left_out.append((f"row {row.line} of the file", reason))
                 continue
             slot[row.station] = row
         if early:
@@ -592,7 +594,7 @@ def _put_turns(
         try:
             place = finder.turn(row.origin, row.destination)
         except InputError as error:
-            report.left_out.append((f"line {row.line}", str(error)))
+            report.left_out.append((f"row {row.line} of the file", str(error)))
             continue
         report.placed[f"{row.origin} to {row.destination}"] = place
         if not row.share:
@@ -608,7 +610,7 @@ def _put_turns(
         }
         if not own:
             reason = f"a share of {share:.0%} of {approach}, which no count of the scenario has"
-            report.left_out.append((f"line {row.line}", reason))
+            report.left_out.append((f"row {row.line} of the file", reason))
             continue
         report.taken += 1
         for (begin, end), number in own.items():

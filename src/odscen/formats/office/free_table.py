@@ -528,7 +528,7 @@ class FreeTable:
                 read.append((station, stamp, end, sum(known), line))
         if not read:
             raise InputError(
-                f"no row of the table can be used: {self._left[0].where}: {self._left[0].reason}"
+                f"no row of the table can be used: {self._left[0].source}: {self._left[0].reason}"
                 if self._left
                 else "the table has no rows"
             )
@@ -647,7 +647,7 @@ class FreeTable:
         return value
 
     def _leave_out(self, line: int, reason: str) -> None:
-        self._left.append(LeftOut(f"line {line}", reason))
+        self._left.append(LeftOut(f"row {line} of the file", reason))
 
     def _stamp_reader(self, role: str) -> StampReader:
         column = self._index[role]

@@ -247,7 +247,7 @@ class _Reader:
         return value
 
     def _refuse(self, element: etree._Element, reason: str) -> None:
-        self._left.append(LeftOut(f"line {_line(element)}", reason))
+        self._left.append(LeftOut(f"row {_line(element)} of the file", reason))
 
 
 def _clock(text: str) -> float:

@@ -88,9 +88,9 @@ class StationPlace:
 
 
 class LeftOut(NamedTuple):
-    """A row that was not taken; ``where`` is its line or element."""
+    """A row that was not taken; ``source`` is its line or element."""
 
-    where: str
+    source: str
     reason: str
 
 

@@ -171,7 +171,9 @@ def _read_square(
         value = _number(word, line, comma=comma)
         origin, destination = zones[index // size], zones[index % size]
         if value < 0:
-            left.append(LeftOut(f"line {line}", f"{origin} to {destination}: {value:g} trips"))
+            left.append(
+                LeftOut(f"row {line} of the file", f"{origin} to {destination}: {value:g} trips")
+            )
         elif value > 0:
             rows.append(TripRow(origin, destination, value, None, None, line))
     rest = next(words, None)
@@ -201,7 +203,7 @@ def _read_pairs(
         value = _number(word, line.number, comma=comma)
         if value < 0:
             reason = f"{origin} to {destination}: {value:g} trips"
-            left.append(LeftOut(f"line {line.number}", reason))
+            left.append(LeftOut(f"row {line.number} of the file", reason))
         else:
             rows.append(TripRow(origin, destination, value, None, None, line.number))
     if not zones:
