@@ -8,6 +8,7 @@ import signal
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from bench.fuzz.batches import try_batch
@@ -79,9 +80,14 @@ def test_a_refused_command_leaves_everything_as_it_was(tmp_path: Path) -> None:
     assert left_over(before, listing([tmp_path]), refused=False).endswith(".building-x")
 
 
+def own_limits() -> Limits:
+    """Limits that take no process for a leftover that other tests have started here."""
+    return Limits(own={child.pid for child in psutil.Process().children()})
+
+
 def test_a_batch_finds_what_its_trials_find_alone(tmp_path: Path) -> None:
     """Trials of one target in one process end as they do one by one."""
-    limits = Limits()
+    limits = own_limits()
     material = Material(tmp_path / "material", ())
 
     def trial(one: Trial) -> str:
@@ -113,30 +119,19 @@ def test_a_batch_that_dies_is_a_find_of_the_trial_in_which_it_died(tmp_path: Pat
             os.kill(os.getpid(), signal.SIGKILL)
         return "made up"
 
-    alone = Trial(Material(tmp_path, ()), Limits(), tmp_path / "batch", 1, trial_rng("t", 1))
+    alone = Trial(Material(tmp_path, ()), own_limits(), tmp_path / "batch", 1, trial_rng("t", 1))
     alone.folder.mkdir()
     verdicts = {one.seed: one.finding.verdict for one in try_batch(alone, "t", trial, range(1, 6))}
     assert verdicts == {1: Verdict.FINE, 2: Verdict.FINE, 3: Verdict.CRASH}
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ('{"seed": 3, "seed": 4}', "twice"),
-        ('{"seed": "3"}', None),
-    ],
-)
-def test_what_a_document_says_is_held_against_what_was_read(
-    tmp_path: Path, given: str, words: str | None
-) -> None:
+@pytest.mark.parametrize("given", ['{"seed": 3, "seed": 4}', '{"seed": "3"}'])
+def test_what_a_document_says_is_held_against_what_was_read(tmp_path: Path, given: str) -> None:
     data = json.loads(SCENARIO.read_text(encoding="utf-8"))
     file = tmp_path / "a.scenario.json"
     file.write_text(json.dumps(data), encoding="utf-8")
     assert wrong_in_document(file) == ""
     data.pop("seed")
     file.write_text(given[:-1] + "," + json.dumps(data)[1:], encoding="utf-8")
-    if words is None:
-        with pytest.raises(InputError, match="seed"):
-            wrong_in_document(file)
-    else:
-        assert words in wrong_in_document(file)
+    with pytest.raises(InputError, match="seed"):
+        wrong_in_document(file)
