@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 Element = etree._Element
 
-_SPEED_UNITS: Final = (("km/h", 3.6), ("mph", 1 / 0.44704), ("m/s", 1.0))
+_SPEED_UNITS: Final = (("km/h", 3.6), ("mph", 1 / 0.44704))
 _SHORTEST: Final = 1e-9
 """Geometries of this length, metres, would have the length 0 when written."""
 _SPIRAL: Final = ("curvStart", "curvEnd")
@@ -73,7 +73,7 @@ def write_opendrive(model: OpenDrive, *, vendor: str = "odscen", date: str = "")
     return etree.tostring(root, encoding="UTF-8", xml_declaration=True, pretty_print=True)
 
 
-def _add(parent: Element, tag: str, **attributes: str | float | None) -> Element:
+def _append_element(parent: Element, tag: str, **attributes: str | float | None) -> Element:
     """Append an element: numbers as lengths, ``None`` left out, a last underscore dropped."""
     element = etree.SubElement(parent, tag)
     for name, value in attributes.items():
@@ -82,16 +82,16 @@ def _add(parent: Element, tag: str, **attributes: str | float | None) -> Element
     return element
 
 
-def _angle(value: float) -> str:
+def _format_angle(value: float) -> str:
     return number(math.remainder(value, 2.0 * math.pi), 10)
 
 
-def _coefficient(value: float) -> str:
+def _format_coefficient(value: float) -> str:
     return f"{value + 0.0:.12g}"  # + 0.0: no negative zero
 
 
 def _write_header(root: Element, header: Header, vendor: str, date: str) -> None:
-    element = _add(
+    element = _append_element(
         root,
         "header",
         revMajor=str(header.rev_major),
@@ -106,15 +106,15 @@ def _write_header(root: Element, header: Header, vendor: str, date: str) -> None
         vendor=vendor,
     )
     if header.geo_reference:
-        _add(element, "geoReference").text = header.geo_reference
+        _append_element(element, "geoReference").text = header.geo_reference
     if any(header.offset):
         x, y, z, hdg = header.offset
-        _add(element, "offset", x=x, y=y, z=z, hdg=_angle(hdg))
+        _append_element(element, "offset", x=x, y=y, z=z, hdg=_format_angle(hdg))
 
 
 # ----------------------------------------------------------------------------- roads
 def _write_road(root: Element, road: Road, rev_minor: int) -> None:
-    element = _add(
+    element = _append_element(
         root,
         "road",
         name=road.name,
@@ -124,35 +124,37 @@ def _write_road(root: Element, road: Road, rev_minor: int) -> None:
         rule=road.rule,
     )
     if road.predecessor or road.successor:
-        link = _add(element, "link")
+        link = _append_element(element, "link")
         _write_link(link, "predecessor", road.predecessor)
         _write_link(link, "successor", road.successor)
     for kind in road.types:
-        item = _add(element, "type", s=kind.s, type=kind.type)
+        item = _append_element(element, "type", s=kind.s, type=kind.type)
         if kind.speed is not None:
             _write_speed(item, kind.speed)
-    plan = _add(element, "planView")
+    plan = _append_element(element, "planView")
     for geometry in road.geometry:
         if geometry.length > _SHORTEST:
             _write_geometry(plan, geometry)
     if road.elevation:
-        _write_cubics(_add(element, "elevationProfile"), "elevation", road.elevation)
+        _write_cubics(_append_element(element, "elevationProfile"), "elevation", road.elevation)
     if road.superelevation:
-        _write_cubics(_add(element, "lateralProfile"), "superelevation", road.superelevation)
-    lanes = _add(element, "lanes")
+        _write_cubics(
+            _append_element(element, "lateralProfile"), "superelevation", road.superelevation
+        )
+    lanes = _append_element(element, "lanes")
     _write_cubics(lanes, "laneOffset", road.lane_offset)
     for section in road.sections:
         _write_section(lanes, section, rev_minor)
     if road.objects:
-        objects = _add(element, "objects")
+        objects = _append_element(element, "objects")
         for furniture in road.objects:
             _write_object(objects, furniture)
     if road.signals or road.signal_references:
-        signals = _add(element, "signals")
+        signals = _append_element(element, "signals")
         for signal in road.signals:
             _write_signal(signals, signal)
         for reference in road.signal_references:
-            place = _add(
+            place = _append_element(
                 signals,
                 "signalReference",
                 s=reference.s,
@@ -166,7 +168,7 @@ def _write_road(root: Element, road: Road, rev_minor: int) -> None:
 def _write_link(parent: Element, tag: str, link: RoadLink | None) -> None:
     if link is None:
         return
-    _add(
+    _append_element(
         parent,
         tag,
         elementType=link.element_type,
@@ -180,23 +182,29 @@ def _write_link(parent: Element, tag: str, link: RoadLink | None) -> None:
 def _write_speed(parent: Element, speed: float, **place: float) -> None:
     """A limit in the unit in which it is a whole number: as signs have it."""
     if math.isinf(speed):
-        _add(parent, "speed", **place, max="no limit")
+        _append_element(parent, "speed", **place, max="no limit")
         return
+    value, unit = _in_unit_of_signs(speed)
+    _append_element(parent, "speed", **place, max=value, unit=unit)
+
+
+def _in_unit_of_signs(speed: float) -> tuple[str, str]:
+    """Speed of m/s as number and unit: km/h or mph where that is a whole number."""
     for unit, per_mps in _SPEED_UNITS:
         value = speed * per_mps
-        if unit == "m/s" or abs(value - round(value)) < 1e-6:
-            _add(parent, "speed", **place, max=number(value, 9), unit=unit)
-            return
+        if abs(value - round(value)) < 1e-6:
+            return number(value, 9), unit
+    return number(speed, 9), "m/s"
 
 
 def _write_geometry(plan: Element, geometry: Geometry) -> None:
-    element = _add(
+    element = _append_element(
         plan,
         "geometry",
         s=geometry.s,
         x=geometry.x,
         y=geometry.y,
-        hdg=_angle(geometry.hdg),
+        hdg=_format_angle(geometry.hdg),
         length=geometry.length,
     )
     names: Sequence[str] = {
@@ -206,9 +214,9 @@ def _write_geometry(plan: Element, geometry: Geometry) -> None:
         GeometryKind.POLY3: tuple("abcd"),
         GeometryKind.PARAM_POLY3: _PARAM_POLY3,
     }[geometry.kind]
-    shape = _add(element, geometry.kind.value)
+    shape = _append_element(element, geometry.kind.value)
     for name, value in zip(names, geometry.params, strict=True):
-        shape.set(name, _coefficient(value))
+        shape.set(name, _format_coefficient(value))
     if geometry.kind is GeometryKind.PARAM_POLY3:
         shape.set("pRange", "arcLength")
 
@@ -219,42 +227,42 @@ def _write_cubics(
     """Profiles over s; those of a lane over its offset from the ``start`` of its section."""
     for record in records:
         place = {"s": record.s} if start is None else {"sOffset": record.s - start}
-        element = _add(parent, tag, **place)
+        element = _append_element(parent, tag, **place)
         for name, value in zip("abcd", record[1:], strict=True):
-            element.set(name, _coefficient(value))
+            element.set(name, _format_coefficient(value))
 
 
 # ----------------------------------------------------------------------------- lanes
 def _write_section(lanes: Element, section: LaneSection, rev_minor: int) -> None:
-    element = _add(lanes, "laneSection", s=section.s)
+    element = _append_element(lanes, "laneSection", s=section.s)
     if section.single_side:
         element.set("singleSide", "true")
     ordered = sorted(section.lanes.values(), key=lambda lane: -lane.id)
     for side, sign in (("left", 1), ("center", 0), ("right", -1)):
         of_side = [lane for lane in ordered if (lane.id > 0) - (lane.id < 0) == sign]
         if of_side:
-            container = _add(element, side)
+            container = _append_element(element, side)
             for lane in of_side:
                 _write_lane(container, lane, section.s, rev_minor)
 
 
 def _write_lane(container: Element, lane: Lane, start: float, rev_minor: int) -> None:
-    element = _add(
+    element = _append_element(
         container, "lane", id=str(lane.id), type=lane.type, level=str(lane.level).lower()
     )
     if lane.direction != "standard":
         element.set("direction", lane.direction)
     if lane.predecessors or lane.successors:
-        link = _add(element, "link")
+        link = _append_element(element, "link")
         for tag, linked in (("predecessor", lane.predecessors), ("successor", lane.successors)):
             for lane_id in linked:
-                _add(link, tag, id=str(lane_id))
+                _append_element(link, tag, id=str(lane_id))
     # Lanes have widths or borders; with both, which some files have, the widths hold.
     _write_cubics(element, "width", lane.widths, start=start)
     if not lane.widths:
         _write_cubics(element, "border", lane.borders, start=start)
     for mark in lane.road_marks:
-        _add(
+        _append_element(
             element,
             "roadMark",
             sOffset=mark.s - start,
@@ -268,7 +276,9 @@ def _write_lane(container: Element, lane: Lane, start: float, rev_minor: int) ->
         _write_speed(element, limit.max, sOffset=limit.s - start)
     _write_access(element, lane, start, rev_minor)
     for height in lane.heights:
-        _add(element, "height", sOffset=height.s - start, inner=height.inner, outer=height.outer)
+        _append_element(
+            element, "height", sOffset=height.s - start, inner=height.inner, outer=height.outer
+        )
 
 
 def _write_access(element: Element, lane: Lane, start: float, rev_minor: int) -> None:
@@ -278,16 +288,16 @@ def _write_access(element: Element, lane: Lane, start: float, rev_minor: int) ->
     for record in lane.access:
         place = {"sOffset": record.s - start, "rule": record.rule or None}
         if rev_minor < 8:
-            _add(element, "access", **place, restriction=record.restriction)
+            _append_element(element, "access", **place, restriction=record.restriction)
             continue
         if group is None or last != (record.s, record.rule):
-            group, last = _add(element, "access", **place), (record.s, record.rule)
-        _add(group, "restriction", type=record.restriction)
+            group, last = _append_element(element, "access", **place), (record.s, record.rule)
+        _append_element(group, "restriction", type=record.restriction)
 
 
 # ----------------------------------------------------------------------------- furniture
 def _write_object(objects: Element, item: RoadObject) -> None:
-    element = _add(
+    element = _append_element(
         objects,
         "object",
         id=item.id,
@@ -297,9 +307,9 @@ def _write_object(objects: Element, item: RoadObject) -> None:
         s=item.s,
         t=item.t,
         zOffset=item.z_offset,
-        hdg=_angle(item.hdg),
-        pitch=_angle(item.pitch),
-        roll=_angle(item.roll),
+        hdg=_format_angle(item.hdg),
+        pitch=_format_angle(item.pitch),
+        roll=_format_angle(item.roll),
         orientation=item.orientation,
         length=item.length,
         width=item.width,
@@ -309,7 +319,7 @@ def _write_object(objects: Element, item: RoadObject) -> None:
     )
     height, z_offset = item.height or 0.0, item.z_offset
     for repeat in item.repeats:
-        _add(
+        _append_element(
             element,
             "repeat",
             s=repeat.s,
@@ -324,14 +334,14 @@ def _write_object(objects: Element, item: RoadObject) -> None:
         )
     # Several outlines have a container since 1.5; a single one is where 1.4 and CARLA look for it.
     several = len(item.outlines) > 1
-    container = _add(element, "outlines") if several else element
+    container = _append_element(element, "outlines") if several else element
     for number_, outline in enumerate(item.outlines):
         _write_outline(container, str(number_), outline)
     _write_validities(element, item.validities)
 
 
 def _write_outline(container: Element, name: str, outline: Outline) -> None:
-    element = _add(
+    element = _append_element(
         container,
         "outline",
         id=name,
@@ -340,21 +350,21 @@ def _write_outline(container: Element, name: str, outline: Outline) -> None:
     )
     for corner in outline.corners:
         if corner.local:
-            _add(element, "cornerLocal", u=corner.a, v=corner.b, z=corner.z, height=corner.height)
+            _append_element(
+                element, "cornerLocal", u=corner.a, v=corner.b, z=corner.z, height=corner.height
+            )
         else:
-            _add(element, "cornerRoad", s=corner.a, t=corner.b, dz=corner.z, height=corner.height)
+            _append_element(
+                element, "cornerRoad", s=corner.a, t=corner.b, dz=corner.z, height=corner.height
+            )
 
 
 def _write_signal(signals: Element, signal: Signal) -> None:
-    value, unit = signal.value, signal.unit
-    if unit == "m/s" and value is not None:
-        unit, factor = next(
-            (name, factor)
-            for name, factor in _SPEED_UNITS
-            if name == "m/s" or abs(value * factor - round(value * factor)) < 1e-6
-        )
-        value *= factor
-    element = _add(
+    value = None if signal.value is None else number(signal.value, 9)
+    unit = signal.unit
+    if unit == "m/s" and signal.value is not None:
+        value, unit = _in_unit_of_signs(signal.value)
+    element = _append_element(
         signals,
         "signal",
         name=signal.name or None,
@@ -362,13 +372,13 @@ def _write_signal(signals: Element, signal: Signal) -> None:
         s=signal.s,
         t=signal.t,
         zOffset=signal.z_offset,
-        hOffset=_angle(signal.h_offset),
+        hOffset=_format_angle(signal.h_offset),
         orientation=signal.orientation,
         dynamic="yes" if signal.dynamic else "no",
         country=signal.country or None,
         type=signal.type,
         subtype=signal.subtype,
-        value=None if value is None else number(value, 9),
+        value=value,
         unit=unit or None,
         text=signal.text or None,
         width=signal.width,
@@ -376,12 +386,12 @@ def _write_signal(signals: Element, signal: Signal) -> None:
     )
     _write_validities(element, signal.validities)
     for signal_id, kind in signal.dependencies:
-        _add(element, "dependency", id=signal_id, type=kind)
+        _append_element(element, "dependency", id=signal_id, type=kind)
 
 
 def _write_validities(parent: Element, validities: Iterable[Validity]) -> None:
     for validity in validities:
-        _add(
+        _append_element(
             parent,
             "validity",
             fromLane=str(validity.from_lane),
@@ -391,7 +401,7 @@ def _write_validities(parent: Element, validities: Iterable[Validity]) -> None:
 
 # ----------------------------------------------------------------------------- junctions
 def _write_controller(root: Element, controller: Controller) -> None:
-    element = _add(
+    element = _append_element(
         root,
         "controller",
         id=controller.id,
@@ -399,18 +409,18 @@ def _write_controller(root: Element, controller: Controller) -> None:
         sequence=None if controller.sequence is None else str(controller.sequence),
     )
     for signal_id, kind in controller.controls:
-        _add(element, "control", signalId=signal_id, type=kind or None)
+        _append_element(element, "control", signalId=signal_id, type=kind or None)
 
 
 def _write_junction(root: Element, junction: Junction) -> None:
-    element = _add(
+    element = _append_element(
         root, "junction", id=junction.id, name=junction.name, mainRoad=junction.main_road
     )
     if junction.type != "default":
         element.set("type", junction.type)
     linked = "linkedRoad" if junction.type == "direct" else "connectingRoad"
     for connection in junction.connections:
-        item = _add(
+        item = _append_element(
             element,
             "connection",
             id=connection.id,
@@ -419,8 +429,8 @@ def _write_junction(root: Element, junction: Junction) -> None:
             contactPoint=connection.contact_point,
         )
         for from_lane, to_lane in connection.lane_links:
-            _add(item, "laneLink", from_=str(from_lane), to=str(to_lane))
+            _append_element(item, "laneLink", from_=str(from_lane), to=str(to_lane))
     for priority in junction.priorities:
-        _add(element, "priority", high=priority.high, low=priority.low)
+        _append_element(element, "priority", high=priority.high, low=priority.low)
     for sequence, controller in enumerate(junction.controllers):
-        _add(element, "controller", id=controller, type="0", sequence=str(sequence))
+        _append_element(element, "controller", id=controller, type="0", sequence=str(sequence))
