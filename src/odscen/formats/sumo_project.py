@@ -79,7 +79,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
         root = read_xml(content, huge=True)
     report = ElementReport(source.file.name)
     if root.tag == "net":
-        on_map = _bring(source, source.file, content, [], report)
+        on_map = _bring_network(source, source.file, content, [], report)
         scenario = _empty_scenario(source, on_map, SUMO_SEED, report)
         return FileContent(scenario, lists=report.lists)
     if root.tag not in _ROOTS:
@@ -98,14 +98,14 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     ]
     net_file = source.file.other(net_name)
     programs = _take_programs(files, report)
-    on_map = _bring(source, net_file, _unpacked(net_file.read()), programs, report)
+    on_map = _bring_network(source, net_file, _unpacked(net_file.read()), programs, report)
     begin = seconds_of(options.get("begin")) or 0.0
     seed = int(float(options.get("seed") or SUMO_SEED))
     scenario = _empty_scenario(source, on_map, max(0, min(seed, 2**31 - 1)), report)
     project = SumoProject(
         begin=begin,
         options=allowed_options({n: v for n, v in options.items() if n not in _OWN}),
-        files=tuple(_packed(file) for file in files if len(file.root)),
+        files=tuple(_pack_file(file) for file in files if len(file.root)),
     )
     scenario = scenario.model_copy(
         update={
@@ -167,7 +167,7 @@ def _read_files(
         content = _unpacked(given.read())
         with in_file(given.where):
             root = read_xml(content, huge=True)
-            changed = _embed(root, given, 0)
+            changed = _embed_includes(root, given, 0)
         encoding = (root.getroottree().docinfo.encoding or "UTF-8").upper()
         if changed or encoding not in ("UTF-8", "ASCII", "US-ASCII"):
             text = etree.tostring(root, encoding="unicode") + "\n"
@@ -177,7 +177,7 @@ def _read_files(
         yield _ReadFile(bare.removesuffix(".gz").lstrip(".+=-") or "file.xml", kind, root, text)
 
 
-def _embed(root: etree._Element, file: GivenFile, depth: int) -> bool:
+def _embed_includes(root: etree._Element, file: GivenFile, depth: int) -> bool:
     """Put in what a file includes, so that it needs no other; whether there was anything."""
     changed = False
     for element in list(root.iter("include", *_EMBEDS)):
@@ -189,7 +189,7 @@ def _embed(root: etree._Element, file: GivenFile, depth: int) -> bool:
         other = file.other(named)
         with in_file(other.where):
             inner = read_xml(_unpacked(other.read()), huge=True)
-            _embed(inner, other, depth + 1)
+            _embed_includes(inner, other, depth + 1)
         changed = True
         parent = element.getparent()
         if element.tag == "include" and parent is not None:
@@ -247,7 +247,7 @@ def _line(element: etree._Element) -> int:
     return line if isinstance(line, int) else 0
 
 
-def _bring(
+def _bring_network(
     source: ImportSource,
     file: GivenFile,
     content: bytes,
@@ -370,7 +370,7 @@ def _last_departure(files: Sequence[_ReadFile]) -> float:
     return min(last, 1e8)
 
 
-def _packed(file: _ReadFile) -> SumoFile:
+def _pack_file(file: _ReadFile) -> SumoFile:
     counts = Counter(str(e.tag) for e in file.root if isinstance(e.tag, str))
     return SumoFile.of(file.name, file.kind, file.text, dict(sorted(counts.items())))
 

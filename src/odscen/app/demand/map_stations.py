@@ -243,7 +243,7 @@ class StationFinder:
         return projection(parse(entry.read("xodr"), file=entry.path("xodr").name).header)
 
     @cached_property
-    def _next(self) -> tuple[Int32Array, Int32Array]:
+    def _edges_ahead(self) -> tuple[Int32Array, Int32Array]:
         """Targets of successor edges, sorted by source, and where those of each node begin."""
         graph = self._lanes
         follows = graph.relation == Relation.SUCCESSOR
@@ -253,7 +253,7 @@ class StationFinder:
         return target[order].astype(np.int32), starts.astype(np.int32)
 
     @cached_property
-    def _previous(self) -> tuple[Int32Array, Int32Array]:
+    def _edges_behind(self) -> tuple[Int32Array, Int32Array]:
         graph = self._lanes
         follows = graph.relation == Relation.SUCCESSOR
         source, target = graph.source[follows], graph.target[follows]
@@ -262,7 +262,7 @@ class StationFinder:
         return source[order].astype(np.int32), starts.astype(np.int32)
 
     def _successors(self, node: int) -> list[int]:
-        targets, starts = self._next
+        targets, starts = self._edges_ahead
         return [int(other) for other in targets[starts[node] : starts[node + 1]]]
 
     def _last_nodes(self, nodes: Int32Array) -> list[int]:
@@ -304,14 +304,14 @@ class StationFinder:
         forward = {bool(lanes.lanes.forward[row]) for row in rows.tolist()}
         if len(forward) == 1:
             return MapPlace(name, node)
-        for table, behind in ((self._next, True), (self._previous, False)):
-            others = self._neighbours(node, table)
+        for table, behind in ((self._edges_ahead, True), (self._edges_behind, False)):
+            others = self._find_neighbours(node, table)
             if len(others) == 1:
                 pair = (name, others[0]) if behind else (others[0], name)
                 return MapPlace(PLACE_SEPARATOR.join(pair), node)
         return MapPlace(name, node, note="both directions of the segment are counted there")
 
-    def _neighbours(self, node: int, table: tuple[Int32Array, Int32Array]) -> list[str]:
+    def _find_neighbours(self, node: int, table: tuple[Int32Array, Int32Array]) -> list[str]:
         """Segments that come behind, or before, those lanes of a segment that a node is on."""
         lanes = self._lanes
         row = int(lanes.lane[node])

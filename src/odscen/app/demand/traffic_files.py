@@ -171,16 +171,16 @@ class _KeptColumns:
     def of(self, table: GivenTable) -> Mapping[str, str]:
         """Columns that were said of a table with the same titles."""
         self._key = digest("\n".join(iterate_titles(table)).encode())
-        columns: Mapping[str, str] = self._all().get(self._key, {})
+        columns: Mapping[str, str] = self._read_all_mappings().get(self._key, {})
         return columns
 
     def remember(self, columns: Mapping[str, str]) -> None:
         """Keep the columns of the table that was read last."""
         if self._key:
-            known = {**self._all(), self._key: dict(columns)}
+            known = {**self._read_all_mappings(), self._key: dict(columns)}
             write_text(self._file, json.dumps(known, indent=1, sort_keys=True) + "\n")
 
-    def _all(self) -> dict[str, dict[str, str]]:
+    def _read_all_mappings(self) -> dict[str, dict[str, str]]:
         if not self._file.is_file():
             return {}
         try:
@@ -208,7 +208,7 @@ def put_traffic(
         If nothing of it can be used.
     """
     report = TrafficReport(read.what, rows=read.rows, columns=dict(read.columns))
-    report.left_out = [(left.source, left.reason) for left in _summed(read.left_out)]
+    report.left_out = [(left.source, left.reason) for left in _sum_up_left_out(read.left_out)]
     report.notes = list(read.notes)
     finder = StationFinder(loaded)
     known = {**(places or {}), **read.stations}
@@ -227,7 +227,7 @@ def put_traffic(
     return scenario, report
 
 
-def _summed(left: Iterable[LeftOut]) -> list[LeftOut]:
+def _sum_up_left_out(left: Iterable[LeftOut]) -> list[LeftOut]:
     """Rows left out; of many for want of a value only the first."""
     listed = list(left)
     empty = [row for row in listed if row.reason.endswith(": no value")]
@@ -330,7 +330,7 @@ def _put_trips(
     parts: dict[str, dict[str, Any]] = {}
     for number, ((begin, end), trips) in enumerate(sorted(slices.items(), key=str), start=1):
         own = (name or "trips") + ("" if len(slices) == 1 else f"-{number}")
-        window = _window(begin, end, clock if read.of_day else 0.0)
+        window = _window_of_matrix(begin, end, clock if read.of_day else 0.0)
         if window is None:
             reason = f"{len(trips)} rows are of a time before the run starts"
             report.left_out.append((f"{_clock(begin or 0)} to {_clock(end or 0)}", reason))
@@ -359,7 +359,7 @@ def _put_trips(
     return put_parts(scenario, loaded.sumo.graph, "matrices", parts)
 
 
-def _window(
+def _window_of_matrix(
     begin: float | None, end: float | None, clock: float
 ) -> tuple[float | None, float | None, float] | None:
     """Window of a matrix in seconds of the run, and the share of it that is after the start."""
@@ -452,8 +452,10 @@ class _VolumeWriter:
         if report.unplaced:
             gone = sum(row.station in report.unplaced for row in read.volumes)
             report.left_out.append((f"{gone} rows", "their stations are not on the map"))
-        self._judge(counts)
-        part = name or ("counts" if not scenario.demand.counts else f"counts-{_next(scenario)}")
+        self._judge_counts(counts)
+        part = name or (
+            "counts" if not scenario.demand.counts else f"counts-{_next_number(scenario)}"
+        )
         mix = {key: value for key, value in fields.items() if key == "mix"}
         report.next = (
             "run it: the traffic reproduces the counts"
@@ -507,7 +509,7 @@ class _VolumeWriter:
             reason = f"{row[0]}: its slice has {row[2] - row[1]:g} s, most have {usual:g}"
             self._report.left_out.append((_clock(row[1] + self._scenario.demand.clock), reason))
 
-    def _judge(self, counts: Iterable[tuple[str, float, float, float]]) -> None:
+    def _judge_counts(self, counts: Iterable[tuple[str, float, float, float]]) -> None:
         """Look for jumps, zeros, equal values, gaps, and more than a road carries."""
         doubts, clock = self._report.doubts, self._scenario.demand.clock
         by_place: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
@@ -561,7 +563,7 @@ def _runs(place: str, numbers: list[float]) -> list[str]:
     return found
 
 
-def _next(scenario: Scenario) -> int:
+def _next_number(scenario: Scenario) -> int:
     taken = {part.id for part in scenario.demand.counts}
     return next(n for n in range(2, len(taken) + 3) if f"counts-{n}" not in taken)
 

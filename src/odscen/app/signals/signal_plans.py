@@ -214,7 +214,9 @@ def take_signals(
                 if strict or not fits:
                     raise
                 raw.append(light.id)
-                notes.append(f"tlLogic {light.id!r} runs as it is in the file: {_reasons(error)}")
+                notes.append(
+                    f"tlLogic {light.id!r} runs as it is in the file: {_list_reasons(error)}"
+                )
                 for name in views[light.id].names:
                     timings.pop(name, None)
                 continue
@@ -228,7 +230,7 @@ def take_signals(
     return with_fields(scenario, signals=signals), tuple(notes)
 
 
-def _reasons(error: InputError) -> str:
+def _list_reasons(error: InputError) -> str:
     problems = getattr(error, "problems", ()) or ()
     return "; ".join(map(str, problems)) or str(error)
 

@@ -241,15 +241,15 @@ class FreeTable:
             if title.lower() not in lower:
                 listed = ", ".join(shown(name) for name in table.titles)
                 raise InputError(f"no column has the title {shown(title)}; there are {listed}")
-            self._put(role, lower[title.lower()])
+            self._put_column(role, lower[title.lower()])
         cells = (cell for row in table.rows[:2000] for cell in row)
         self._comma = table.separator != "," and has_decimal_commas(cells)
 
-    def _put(self, role: str, column: int) -> None:
+    def _put_column(self, role: str, column: int) -> None:
         self._index[role] = column
         self.columns[role] = self._table.titles[column]
 
-    def _guess(self, *roles: str) -> None:
+    def _guess_columns(self, *roles: str) -> None:
         """Give roles that have no column the first whose title, or a word of it, is one of theirs.
 
         Titles that are one of a role as a whole go first.
@@ -259,7 +259,7 @@ class FreeTable:
                 taken = set(self._index.values())
                 for column, title in enumerate(self._table.titles):
                     if role not in self._index and column not in taken and fits(role, title):
-                        self._put(role, column)
+                        self._put_column(role, column)
 
     def read(self) -> TrafficFile:
         """Read what it is.
@@ -286,16 +286,18 @@ class FreeTable:
         timed = any(re.fullmatch(_ROLES["station"], title) for title in titles)
         given = {"origin", "destination"} <= self._index.keys()
         if given or (all(pairs) and not timed and "station" not in self._index):
-            self._guess("origin", "destination", "trips", "time", "end")
+            self._guess_columns("origin", "destination", "trips", "time", "end")
             if {"origin", "destination", "trips"} <= self._index.keys():
                 return self._read_pairs()
         slices = self._time_columns()
         if len(slices) >= 2 and len(slices) >= len(titles) - 8:
-            self._guess("station", "date", "bearing", "lon", "lat", "x", "y", "edge", "lane", "pos")
+            self._guess_columns(
+                "station", "date", "bearing", "lon", "lat", "x", "y", "edge", "lane", "pos"
+            )
             return self._read_wide(slices)
-        self._guess("lon", "lat", "edge", "lane", "pos", "number", "date", "time", "end")
-        self._guess("count", "station")
-        self._guess("bearing", "x", "y")
+        self._guess_columns("lon", "lat", "edge", "lane", "pos", "number", "date", "time", "end")
+        self._guess_columns("count", "station")
+        self._guess_columns("bearing", "x", "y")
         return self._read_long()
 
     # ------------------------------------------------------------------ matrices
@@ -392,7 +394,7 @@ class FreeTable:
             first = next((n for n in range(len(self._table.titles)) if n not in slices), None)
             if first is None:
                 raise InputError("no column says which station a row is of")
-            self._put("station", first)
+            self._put_column("station", first)
         reader = StampReader(self._table.titles)
         stamps = {column: reader.read(self._table.titles[column]) for column in slices}
         begins = sorted({stamp.second for stamp in stamps.values()})
@@ -451,7 +453,7 @@ class FreeTable:
         if "station" not in self._index:
             for role in ("edge", "lane"):
                 if role in self._index:
-                    self._put("station", self._index[role])
+                    self._put_column("station", self._index[role])
                     break
         placed = {"edge", "lane"} & self._index.keys() or {"lon", "lat"} <= self._index.keys()
         placed = placed or {"x", "y"} <= self._index.keys()

@@ -124,7 +124,7 @@ class _Reader:
         """Read an ``<interval>``, with relations, edges, or as a row of an E1 output."""
         begin, end = self._number(interval, "begin"), self._number(interval, "end")
         if begin < 0 or end <= begin:
-            self._refuse(interval, f"the interval from {begin:g} to {end:g} is none")
+            self._leave_out(interval, f"the interval from {begin:g} to {end:g} is none")
             return
         self._intervals.add((begin, end))
         if interval.get("nVehContrib") is not None or interval.get("nVehEntered") is not None:
@@ -134,7 +134,7 @@ class _Reader:
             key = "nVehContrib" if interval.get("nVehContrib") is not None else "nVehEntered"
             number = self._number(interval, key)
             if number < 0:
-                self._refuse(interval, f"{name}: {key} is {number:g}")
+                self._leave_out(interval, f"{name}: {key} is {number:g}")
                 return
             self._outputs.append(VolumeRow(name, begin, end, number, _line(interval)))
             return
@@ -150,7 +150,7 @@ class _Reader:
         self._rows += 1
         origin, destination = element.get("from"), element.get("to")
         if not origin or not destination:
-            self._refuse(element, "from or to is missing")
+            self._leave_out(element, "from or to is missing")
             return
         name = self._attribute or "count"
         share = element.get(name) is None and element.get("probability") is not None
@@ -158,11 +158,11 @@ class _Reader:
         if text is None:
             others = sorted({str(key) for key in element.attrib} - {"from", "to"})
             listed = f"; it has {', '.join(others)}" if others else ""
-            self._refuse(element, f"{origin} to {destination}: no {name}{listed}")
+            self._leave_out(element, f"{origin} to {destination}: no {name}{listed}")
             return
         value = self._number(element, "probability" if share else name)
         if value < 0:
-            self._refuse(element, f"{origin} to {destination}: {value:g}")
+            self._leave_out(element, f"{origin} to {destination}: {value:g}")
         elif element.tag == "tazRelation":
             if value > 0:
                 self._trips.append(TripRow(origin, destination, value, begin, end, _line(element)))
@@ -193,11 +193,11 @@ class _Reader:
                 names.append("qLKW")
         if not names:
             others = ", ".join(sorted(str(key) for key in element.attrib if key != "id"))
-            self._refuse(element, f"edge {edge}: no count; it has {others or 'nothing'}")
+            self._leave_out(element, f"edge {edge}: no count; it has {others or 'nothing'}")
             return
         number = sum(self._number(element, name) for name in names)
         if number < 0:
-            self._refuse(element, f"edge {edge}: {number:g} vehicles")
+            self._leave_out(element, f"edge {edge}: {number:g} vehicles")
             return
         self._taken.update(names)
         self._stations[edge] = StationPlace(edge=edge)
@@ -208,7 +208,7 @@ class _Reader:
         self._rows += 1
         name, lane = element.get("id"), element.get("lane")
         if not name or not lane:
-            self._refuse(element, "id or lane is missing")
+            self._leave_out(element, "id or lane is missing")
             return
         text = element.get("pos", "0")
         try:
@@ -216,7 +216,7 @@ class _Reader:
         except ValueError:
             pos = math.nan
         if not math.isfinite(pos):
-            self._refuse(element, f"{name}: pos is {shown(text)}")
+            self._leave_out(element, f"{name}: pos is {shown(text)}")
             return
         self._stations[name] = StationPlace(lane=lane, pos=pos)
 
@@ -229,7 +229,7 @@ class _Reader:
             if part.tag in ("tazSource", "tazSink"):
                 edges.append(part.get("id", ""))
         if not name or not edges:
-            self._refuse(element, f"{shown(name)}: a district without edges")
+            self._leave_out(element, f"{shown(name)}: a district without edges")
             return
         self._zones[name] = tuple(dict.fromkeys(edges))
 
@@ -246,7 +246,7 @@ class _Reader:
             )
         return value
 
-    def _refuse(self, element: etree._Element, reason: str) -> None:
+    def _leave_out(self, element: etree._Element, reason: str) -> None:
         self._left.append(LeftOut(f"row {_line(element)} of the file", reason))
 
 

@@ -114,18 +114,18 @@ class StampReader:
             raise InputError("the time is missing")
         if match := _YEAR_FIRST.fullmatch(text):
             year, month, day = int(match[1]), int(match[2]), int(match[3])
-            return self._dated(text, (year, month, day), match.groups()[3:7], match[8])
+            return self._read_dated(text, (year, month, day), match.groups()[3:7], match[8])
         if match := _YEAR_LAST.fullmatch(text):
             year = int(match[4]) + (2000 if len(match[4]) == 2 else 0)
             day, month = int(match[1]), int(match[3])
             if self.months_first and match[2] == "/":
                 day, month = month, day
-            return self._dated(text, (year, month, day), match.groups()[4:8], match[9])
+            return self._read_dated(text, (year, month, day), match.groups()[4:8], match[9])
         if match := _ONLY_TIME.fullmatch(text):
             return Stamp(None, _seconds(match.groups()[:4], text), None, of_day=True)
         if self._compact and (match := _COMPACT.fullmatch(text)):
             year = int(match[1]) + (2000 if len(match[1]) == 2 else 0)
-            return self._dated(text, (year, int(match[2]), int(match[3])), (None,) * 4, None)
+            return self._read_dated(text, (year, int(match[2]), int(match[3])), (None,) * 4, None)
         if match := _HALF_RANGE.fullmatch(text):
             end = self.read(f"{_with_minutes(match[3])} {match[4]}").second
             begin = self.read(f"{_with_minutes(match[1])} {match[2] or match[4]}").second
@@ -148,7 +148,7 @@ class StampReader:
         number -= self._first_hour if of_day else 0
         return Stamp(None, number * SECONDS[self._unit], None, of_day=of_day)
 
-    def _dated(
+    def _read_dated(
         self, text: str, ymd: tuple[int, int, int], time: tuple[str | None, ...], rest: str | None
     ) -> Stamp:
         offset = _OFFSET.fullmatch(rest or "")

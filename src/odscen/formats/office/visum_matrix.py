@@ -66,8 +66,8 @@ def read_visum_matrix(text: str) -> TrafficFile:
     )
     mode = ""
     if "M" in letters:
-        mode = _required(lines, "the transport system").text.strip()
-    window = _required(lines, "the times from and to")
+        mode = _require_line(lines, "the transport system").text.strip()
+    window = _require_line(lines, "the times from and to")
     words = window.text.split()
     if len(words) < 2:
         raise InputError(
@@ -80,7 +80,7 @@ def read_visum_matrix(text: str) -> TrafficFile:
             f"the matrix is from {words[0]} to {words[1]}: it ends before it begins",
             element=f"line {window.number}",
         )
-    factor_line = _required(lines, "the factor")
+    factor_line = _require_line(lines, "the factor")
     factor = _number(factor_line.text.strip(), factor_line.number, comma=comma)
     if form == "V":
         rows, zones, left = _read_square(lines, comma=comma)
@@ -121,7 +121,7 @@ def _content_lines(text: str) -> Iterator[_Line]:
         yield _Line(number, stripped)
 
 
-def _required(lines: Iterator[_Line], what: str) -> _Line:
+def _require_line(lines: Iterator[_Line], what: str) -> _Line:
     line = next(lines, None)
     if line is None:
         raise InputError(f"the VISUM matrix ends where {what} should be")
@@ -148,7 +148,7 @@ def _number(word: str, line: int, *, comma: bool) -> float:
 def _read_square(
     lines: Iterator[_Line], *, comma: bool
 ) -> tuple[list[TripRow], list[str], list[LeftOut]]:
-    count_line = _required(lines, "the number of zones")
+    count_line = _require_line(lines, "the number of zones")
     if not count_line.text.isdecimal() or not 0 < int(count_line.text) <= MOST_ZONES:
         raise InputError(
             f"{shown(count_line.text)} is no number of zones from 1 to {MOST_ZONES}",
@@ -157,7 +157,7 @@ def _read_square(
     size = int(count_line.text)
     zones: list[str] = []
     while len(zones) < size:
-        zones += _required(lines, f"the numbers of {size} zones").text.split()
+        zones += _require_line(lines, f"the numbers of {size} zones").text.split()
     if len(zones) > size:
         raise InputError(f"{len(zones)} numbers of zones are given, {size} were announced")
     words = ((line.number, word) for line in lines for word in line.text.split())

@@ -419,7 +419,7 @@ def _paint_crosswalk(plan: RoadPlan, s: float, drawn: _Drawn) -> None:
         for a, b in ((-u, -v), (u, -v), (u, v), (-u, v), (-u, -v))
     )
     plan.objects.append(
-        _object(
+        _draw_object(
             drawn,
             "crosswalk",
             "Crosswalk",
@@ -432,7 +432,7 @@ def _paint_crosswalk(plan: RoadPlan, s: float, drawn: _Drawn) -> None:
     )
 
 
-def _object(
+def _draw_object(
     drawn: _Drawn,
     kind: str,
     name: str,
@@ -468,7 +468,7 @@ def _object(
 # ------------------------------------------------------------------ junctions
 
 
-def _approach(plan: RoadPlan, leg: Leg, *, arriving: bool) -> Approach:
+def _plan_approach(plan: RoadPlan, leg: Leg, *, arriving: bool) -> Approach:
     pose = plan.divider(at_end=leg.at_end)
     return Approach(
         leg,
@@ -501,7 +501,9 @@ def _draw_junction(
     connections: list[model.Connection] = []
     movements = _find_movements(network, junction, linked, plans, applied, drawn)
     for movement in movements:
-        connections.append(_connect(network, movement, plans, number, len(connections), drawn))
+        connections.append(
+            _connect_lanes(network, movement, plans, number, len(connections), drawn)
+        )
     for start, end in _find_corners(linked, plans):
         connections.append(_connect_walk(start, end, plans, number, len(connections), drawn))
     if not connections:
@@ -655,9 +657,9 @@ def _find_movements(
     """Movements of cars, buses and bicycles between the lanes of the legs."""
     movements: list[Movement] = []
     flows: list[_Flow] = []
-    outs = {leg: _approach(plans[leg.street], leg, arriving=False) for leg in legs}
+    outs = {leg: _plan_approach(plans[leg.street], leg, arriving=False) for leg in legs}
     for leg in legs:
-        start = _approach(plans[leg.street], leg, arriving=True)
+        start = _plan_approach(plans[leg.street], leg, arriving=True)
         if not start.lanes:
             continue
         if len(legs) == 1:
@@ -798,7 +800,7 @@ def _lane_id(leg: Leg, place: int, *, arriving: bool) -> int:
     return sign * (place + 1)
 
 
-def _connect(
+def _connect_lanes(
     network: StreetNetwork,
     movement: Movement,
     plans: dict[int, RoadPlan],
@@ -1098,7 +1100,7 @@ def _paint_stop_line(
     width = sum(lane.width for lane in coming if lane.kind not in ("sidewalk", "parking"))
     s = plan.line.length - back if leg.at_end else back
     plan.objects.append(
-        _object(
+        _draw_object(
             drawn,
             "roadMark",
             "StopLine",
@@ -1202,7 +1204,7 @@ def _draw_midway_signals(plans: dict[int, RoadPlan], found: Furniture, drawn: _D
             )
         )
         plan.objects.append(
-            _object(
+            _draw_object(
                 drawn,
                 "roadMark",
                 "StopLine",

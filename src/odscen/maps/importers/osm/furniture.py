@@ -122,7 +122,7 @@ def lone_signals(extract: Extract, network: StreetNetwork) -> set[int]:
                 continue
             ways_out = [
                 (length - s if ahead else s, network.ends[street.nodes[-1 if ahead else 0]])
-                for ahead in _directions(network, street, place, tags)
+                for ahead in _directions_faced_by(network, street, place, tags)
             ]
             if not any(away <= AHEAD and len(ends) > 2 for away, ends in ways_out):
                 lone.add(node)
@@ -161,10 +161,10 @@ def find_crossings(
         elif len(places) > 1 and item.id in network.ends and len(network.ends[item.id]) > 2:
             # In the middle of a junction: of the streets there the least one is not meant.
             street, place = max(places, key=lambda p: (p[0].line.length, -p[0].number))
-            found.append(_crossing(street, place, source, tags, 0.5))
+            found.append(_plan_crossing(street, place, source, tags, 0.5))
         else:
             street, place = places[0]
-            found.append(_crossing(street, place, source, tags, 0.9))
+            found.append(_plan_crossing(street, place, source, tags, 0.9))
     # Footways and paths across, where no node says so.
     lines = [street.line.trace for street in network.streets]
     tree = shapely.STRtree(lines)
@@ -187,7 +187,7 @@ def find_crossings(
             street = network.streets[index]
             if _is_elsewhere(network, street):
                 continue
-            for point in _points(line.intersection(lines[index])):
+            for point in _points_of(line.intersection(lines[index])):
                 along = line.project(point)
                 shared = [street.s[i] for i, n in enumerate(street.nodes) if n in refs]
                 ends_here = min(along, line.length - along) < 1.0
@@ -238,12 +238,12 @@ def _goes_on(
     )
 
 
-def _points(geometry: shapely.Geometry) -> list[shapely.Point]:
+def _points_of(geometry: shapely.Geometry) -> list[shapely.Point]:
     parts = getattr(geometry, "geoms", [geometry])
     return [part for part in parts if part.geom_type == "Point"]
 
 
-def _crossing(
+def _plan_crossing(
     street: Street, place: int, source: str, tags: Tags, confidence: float
 ) -> StreetCrossing:
     kinds = tags.get("crossing", "").split(";")
@@ -298,7 +298,7 @@ def find_controls(
                 rows.append(ControlRow(False, source, f"{kind}: no streets cross here", 0.8))
                 continue
             if kind == "light" and len(junction.legs) == 2:
-                chosen = _facing(network, arriving, item.tags)
+                chosen = _legs_faced_by(network, arriving, item.tags)
             elif kind == "light" or (kind == "stop" and item.tags.get("stop") == "all"):
                 chosen = arriving
             else:
@@ -318,7 +318,7 @@ def find_controls(
             continue
         street, place = along[item.id]
         s, length = street.s[place], street.line.length
-        directions = _directions(network, street, place, item.tags)
+        directions = _directions_faced_by(network, street, place, item.tags)
         confidence = 0.9 if len(directions) == 1 else 0.6
         # One that says no direction, where there are two, is for the nearer junction.
         if len(directions) == 2 and kind != "light":
@@ -354,7 +354,7 @@ def find_controls(
     return controls, midway, rows
 
 
-def _facing(network: StreetNetwork, legs: list[Leg], tags: Tags) -> list[Leg]:
+def _legs_faced_by(network: StreetNetwork, legs: list[Leg], tags: Tags) -> list[Leg]:
     """The legs that a light between two streets is for."""
     said = tags.get("traffic_signals:direction", "")
     chosen = []
@@ -374,7 +374,9 @@ def arrives(network: StreetNetwork, leg: Leg) -> bool:
     return any(lane.carries_cars for lane in lanes)
 
 
-def _directions(network: StreetNetwork, street: Street, place: int, tags: Tags) -> list[bool]:
+def _directions_faced_by(
+    network: StreetNetwork, street: Street, place: int, tags: Tags
+) -> list[bool]:
     """For traffic along the street, against it, or both."""
     stretch = next(one for one in street.stretches if one.first <= place <= one.last)
     section = network.section(stretch)

@@ -86,7 +86,7 @@ def is_ring(network: StreetNetwork, street: Street) -> bool:
     return tags.get("junction") in ("roundabout", "circular")
 
 
-def _level(network: StreetNetwork, street: Street) -> tuple[str, ...]:
+def _level_of(network: StreetNetwork, street: Street) -> tuple[str, ...]:
     tags = network.ways[street.stretches[0].way].tags
     return tuple(tags.get(key, "") for key in ("layer", "bridge", "tunnel"))
 
@@ -144,7 +144,7 @@ def lay_out(
                 continue
             if degree[first] < 3 or degree[last] < 3:
                 continue
-            if any(_level(network, street)):
+            if any(_level_of(network, street)):
                 continue
             length = street.line.length
             needs = [min(layout.cuts[Leg(street.number, at_end)], 18.0) for at_end in (False, True)]
@@ -208,7 +208,7 @@ def _make_junction(
     return junction, _cut_legs(network, junction)
 
 
-def _outward(network: StreetNetwork, leg: Leg, distance: float) -> Pose:
+def _pose_outward(network: StreetNetwork, leg: Leg, distance: float) -> Pose:
     """The pose of a street so far from its node, looking away from the junction."""
     line = network.streets[leg.street].line
     if leg.at_end:
@@ -222,16 +222,16 @@ def _order_legs(network: StreetNetwork, junction: Junction) -> None:
 
     def angle(leg: Leg) -> tuple[float, Leg]:
         length = network.streets[leg.street].line.length
-        pose = _outward(network, leg, min(15.0, 0.6 * length))
+        pose = _pose_outward(network, leg, min(15.0, 0.6 * length))
         if len(junction.nodes) == 1:
-            start = _outward(network, leg, 0.0)
+            start = _pose_outward(network, leg, 0.0)
             return math.atan2(pose.y - start.y, pose.x - start.x), leg
         return math.atan2(pose.y - middle[1], pose.x - middle[0]), leg
 
     junction.legs.sort(key=angle)
 
 
-def _strip(network: StreetNetwork, leg: Leg) -> shapely.Polygon:
+def _strip_of_leg(network: StreetNetwork, leg: Leg) -> shapely.Polygon:
     """The carriageway of a leg up to :data:`REACH`, without sidewalks, from its node outwards."""
     street = network.streets[leg.street]
     right, left = carriageway_edges(end_section(network, street, at_end=leg.at_end))
@@ -256,7 +256,7 @@ def _cut_legs(network: StreetNetwork, junction: Junction) -> dict[Leg, tuple[flo
     legs = junction.legs
     if len(legs) + len(junction.inner) <= 1:
         return dict.fromkeys(legs, (0.0, 0.0))
-    strips = [_strip(network, leg) for leg in legs]
+    strips = [_strip_of_leg(network, leg) for leg in legs]
     inner = [network.streets[number] for number in junction.inner]
     inner_area = shapely.union_all(
         [
@@ -271,11 +271,11 @@ def _cut_legs(network: StreetNetwork, junction: Junction) -> dict[Leg, tuple[flo
         line = network.streets[leg.street].line
         cut = least = LEAST_CUT
 
-        own = _outward(network, leg, 12.0)
+        own = _pose_outward(network, leg, 12.0)
         for j, other in enumerate(legs):
             if i == j:
                 continue
-            there = _outward(network, other, 12.0)
+            there = _pose_outward(network, other, 12.0)
             between = abs(math.remainder(own.hdg - there.hdg, 2 * math.pi))
             area = strips[i].intersection(strips[j])
             far = _reach_along(line, leg, area) if area.area > 0.05 else 0.0
@@ -410,7 +410,7 @@ def find_paths(
             new_ways = (*ways, step.way)
             if step.last and step.street == start.street:
                 continue
-            blocked = _forbidding(network, new_ways, nodes)
+            blocked = _find_forbidding_way(network, new_ways, nodes)
             if blocked is not None:
                 applied.add(blocked)
                 continue
@@ -429,7 +429,9 @@ def find_paths(
     return found
 
 
-def _forbidding(network: StreetNetwork, ways: Sequence[int], nodes: Sequence[int]) -> int | None:
+def _find_forbidding_way(
+    network: StreetNetwork, ways: Sequence[int], nodes: Sequence[int]
+) -> int | None:
     """The restriction against the last step of a path; ``nodes`` lie between its ways."""
     for turn in network.turns:
         if turn.via_node is not None:

@@ -125,7 +125,9 @@ def plan_sections(
     if len(plans) > 1:
         for place, side, limit in ((-1, "right", 1), (0, "left", -1)):
             plan, other = plans[place], plans[place - limit]
-            if not ends_at[1 if place else 0] or _cars(plan, side) <= _cars(other, side):
+            if not ends_at[1 if place else 0] or _count_car_lanes(plan, side) <= _count_car_lanes(
+                other, side
+            ):
                 continue
             want = min(BAY, most)
             if limit > 0 and length - plan.s < want:
@@ -179,7 +181,7 @@ def plan_sections(
     return joined
 
 
-def _cars(plan: PlannedSection, side: str) -> int:
+def _count_car_lanes(plan: PlannedSection, side: str) -> int:
     return sum(keyed.lane.carries_cars for keyed in getattr(plan, side))
 
 
@@ -433,10 +435,10 @@ def _centre_lane(section: PlannedSection) -> model.Lane:
         kind = "broken" if len(right) == len(left) == 1 else "solid"
     elif right or left:
         kind = "solid"
-    return model.Lane(0, "none", road_marks=(_mark(section.s, kind, "none"),))
+    return model.Lane(0, "none", road_marks=(_make_mark(section.s, kind, "none"),))
 
 
-def _mark(s: float, kind: str, change: model.LaneChange) -> model.RoadMark:
+def _make_mark(s: float, kind: str, change: model.LaneChange) -> model.RoadMark:
     return model.RoadMark(s, kind, "standard", "standard", 0.12 if kind != "none" else 0.0, change)
 
 
@@ -447,19 +449,21 @@ def _border_marks(
     if lane.kind == "sidewalk":
         return ()
     if outer is None or outer.kind == "sidewalk":
-        return (_mark(s, "solid" if lane.carries_cars else "none", "none"),)
+        return (_make_mark(s, "solid" if lane.carries_cars else "none", "none"),)
     if not (lane.carries_cars and outer.carries_cars):
         # Bicycles come and go, cars stay where they are; a car never parks in the run of a lane.
-        return (_mark(s, "broken" if "biking" in (lane.kind, outer.kind) else "solid", "none"),)
+        return (
+            _make_mark(s, "broken" if "biking" in (lane.kind, outer.kind) else "solid", "none"),
+        )
     outwards = lane.change in ("yes", "only_right")
     inwards = outer.change in ("yes", "only_left")
     if outwards and inwards:
-        return (_mark(s, "broken", "both"),)
+        return (_make_mark(s, "broken", "both"),)
     if not outwards and not inwards:
-        return (_mark(s, "solid", "none"),)
+        return (_make_mark(s, "solid", "none"),)
     # Ids grow to the left: outwards they fall right of the reference line.
     grows = inwards if sign < 0 else outwards
-    return (_mark(s, "broken", "increase" if grows else "decrease"),)
+    return (_make_mark(s, "broken", "increase" if grows else "decrease"),)
 
 
 def _lane_speeds(

@@ -109,7 +109,7 @@ class StreetLine:
     def places(self, s: FloatArray, t: FloatArray | float = 0.0) -> FloatArray:
         """Places ``(N, 2)`` at ``s``, so far to the left."""
         row = np.clip(np.searchsorted(self.starts, s, side="right") - 1, 0, len(self.arcs) - 1)
-        x, y, hdg, curvature, length = self._columns[:, row]
+        x, y, hdg, curvature, length = self._point_columns[:, row]
         along = s - self.starts[row]
         # Before the first arc and behind the last one straight on, as at its end.
         curved = np.clip(along, 0.0, length)
@@ -123,7 +123,7 @@ class StreetLine:
         return placed
 
     @cached_property
-    def _columns(self) -> FloatArray:
+    def _point_columns(self) -> FloatArray:
         """x, y, heading, curvature and length of each arc; shape ``(5, N)``."""
         return np.array([(*arc.start, arc.curvature, arc.length) for arc in self.arcs]).T
 

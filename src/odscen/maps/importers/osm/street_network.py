@@ -281,7 +281,7 @@ def _read_ways(
         line = lines[way.id]
         walks = {"left": 0.0, "right": 0.0}
         for index in sorted(tree.query(line.buffer(BESIDE)).tolist()):
-            side, length = _accompany(line, footways[index])
+            side, length = _measure_accompaniment(line, footways[index])
             if side:
                 walks[side] += length
         beside = {side: length > BESIDE_SHARE * line.length for side, length in walks.items()}
@@ -289,7 +289,9 @@ def _read_ways(
     return readings
 
 
-def _accompany(line: shapely.LineString, segment: shapely.LineString) -> tuple[str, float]:
+def _measure_accompaniment(
+    line: shapely.LineString, segment: shapely.LineString
+) -> tuple[str, float]:
     """On which side of a line a segment runs along it, and how far."""
     (ax, ay), (bx, by) = segment.coords
     s0, s1 = line.project(shapely.Point(ax, ay)), line.project(shapely.Point(bx, by))
