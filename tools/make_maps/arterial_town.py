@@ -11,25 +11,21 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from scenariogeneration import xodr
 
 from tools.make_maps.builder import Builder
 from tools.make_maps.crossing import crossing
-from tools.make_maps.geometry import Pose
 from tools.make_maps.parts import BROKEN, SOLID, End, LaneSpec, Profile, RoadRecord, street
+from tools.make_maps.town_grid import EAST, NORTH, SOUTH, WEST, Node, TownGrid, draw_offsets
 
 if TYPE_CHECKING:
-    from tools.make_maps.geometry import Geometry
+    from tools.make_maps.geometry import Geometry, Pose
 
-Node = tuple[int, int]
-"""Column and row of a junction."""
-
-COUNT = 40
+COUNT = 50
 """Towns that have a name."""
-HELD_BACK = range(30, 40)
+HELD_BACK = range(30, 50)
 """Seeds on which nothing was chosen: ``docs/capacity.md`` measures on them."""
 
 POCKET = 3.25
@@ -41,34 +37,22 @@ LEAST_WITH_RAMP = 260.0
 """Metres of road between two junctions that has room for a ramp."""
 STUB = 150.0
 """Metres of the roads that lead out of town."""
-EAST, NORTH, WEST, SOUTH = range(4)
 
 
 @dataclass(frozen=True)
-class ArterialGrid:
+class ArterialGrid(TownGrid):
     """Layout of a town.
 
     Attributes
     ----------
-    columns, rows
-        Metres from the first road to each, from west to east and from south to north.
-    lanes, speeds, pockets
-        Lanes each way, limit (km/h), and whether junctions have left-turn lanes: of each column,
-        then of each row.
+    pockets
+        Whether junctions have left-turn lanes: of each column, then of each row.
     walks
         Whether roads have sidewalks and crosswalks; where not, there are ramps.
     """
 
-    columns: tuple[float, ...]
-    rows: tuple[float, ...]
-    lanes: tuple[int, ...]
-    speeds: tuple[int, ...]
     pockets: tuple[bool, ...]
     walks: bool
-
-    def line(self, node: Node, direction: int) -> int:
-        """Place of a road through a node in ``lanes``, ``speeds`` and ``pockets``."""
-        return node[0] if direction % 2 else len(self.columns) + node[1]
 
     def is_arterial(self, line: int) -> bool:
         """Whether a road is one of the fast and wide ones."""
@@ -81,25 +65,18 @@ class ArterialGrid:
             for line in (self.line(node, EAST), self.line(node, NORTH))
         )
 
-    def place(self, node: Node) -> Pose:
-        """Middle of a junction, looking east."""
-        return Pose(self.columns[node[0]], self.rows[node[1]], 0.0)
-
 
 def arterial_town(name: str) -> Builder:
     """Town whose seed is the number at the end of its name."""
     rng = random.Random(f"arterial town {int(name.rpartition('_')[2])}")
     grid = _draw_grid(rng)
     builder = Builder(name)
-    nodes = [(i, j) for i in range(len(grid.columns)) for j in range(len(grid.rows))]
-    arms: dict[Node, dict[int, End]] = {node: {} for node in nodes}
-    for node in nodes:
-        for direction, other in ((EAST, (node[0] + 1, node[1])), (NORTH, (node[0], node[1] + 1))):
-            if other in arms:
-                _add_road(builder, grid, arms, node, other, direction, rng)
-    for node in nodes:
+    arms: dict[Node, dict[int, End]] = {node: {} for node in grid.nodes()}
+    for node, other, direction in grid.roads():
+        _add_road(builder, grid, arms, node, other, direction, rng)
+    for node, own in arms.items():
         _add_stubs(builder, grid, arms, node)
-        _add_junction(builder, grid, node, arms[node], rng)
+        _add_junction(builder, grid, node, own, rng)
     return builder
 
 
@@ -133,18 +110,12 @@ def _draw_grid(rng: random.Random) -> ArterialGrid:
             speeds.append(rng.choice((30, 40, 50, 50)))
             pockets.append(town_pockets and rng.random() < 0.3)
     return ArterialGrid(
-        _draw_offsets(rng, columns, long),
-        _draw_offsets(rng, rows, long),
+        draw_offsets(rng, columns, long),
+        draw_offsets(rng, rows, long),
         tuple(lanes),
         tuple(speeds),
         tuple(pockets),
         rng.random() < 0.5,
-    )
-
-
-def _draw_offsets(rng: random.Random, count: int, long: float) -> tuple[float, ...]:
-    return tuple(
-        accumulate((rng.uniform(0.75, 1.35) * long for _ in range(count - 1)), initial=0.0)
     )
 
 
@@ -283,15 +254,7 @@ def _add_stubs(
     builder: Builder, grid: ArterialGrid, arms: dict[Node, dict[int, End]], node: Node
 ) -> None:
     """Roads out of town: of arterials, and where a corner needs a third arm."""
-    i, j = node
-    outwards = [
-        direction
-        for direction, at_border in (
-            (EAST, i == len(grid.columns) - 1), (NORTH, j == len(grid.rows) - 1),
-            (WEST, i == 0), (SOUTH, j == 0),
-        )
-        if at_border
-    ]  # fmt: skip
+    outwards = grid.outwards(node)
     outwards.sort(key=lambda direction: -grid.speeds[grid.line(node, direction)])
     for direction in outwards:
         line = grid.line(node, direction)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass
-from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from scenariogeneration import xodr
@@ -17,14 +16,11 @@ from scenariogeneration import xodr
 from tools.make_maps import roundabout
 from tools.make_maps.builder import Builder
 from tools.make_maps.crossing import crossing
-from tools.make_maps.geometry import Pose
 from tools.make_maps.parts import End, street
+from tools.make_maps.town_grid import EAST, NORTH, Node, TownGrid, draw_offsets
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-Node = tuple[int, int]
-"""Column and row of a junction."""
 
 COUNT = 32
 """Towns that have a name."""
@@ -32,19 +28,14 @@ ARTERIAL = 24
 """Seed from which on streets have up to four lanes each way, and junctions are far apart."""
 STYLES = ("lights", "none", "signs", "mixed")
 """How junctions are ruled: each second of the unruled ones is wide."""
-EAST, NORTH, WEST, SOUTH = range(4)
 
 
 @dataclass(frozen=True)
-class VariedGrid:
+class VariedGrid(TownGrid):
     """Layout of a town.
 
     Attributes
     ----------
-    columns, rows
-        Metres from the first street to each, from west to east and from south to north.
-    lanes, speeds
-        Lanes each way and limit (km/h) of each column, then of each row.
     reach
         Metres from the middle of a junction to the end of its arms, without what lanes add.
     style
@@ -53,26 +44,14 @@ class VariedGrid:
         Streets between two junctions that are not there.
     """
 
-    columns: tuple[float, ...]
-    rows: tuple[float, ...]
-    lanes: tuple[int, ...]
-    speeds: tuple[int, ...]
     reach: float
     style: str
     closed: frozenset[tuple[Node, int]]
-
-    def line(self, node: Node, direction: int) -> int:
-        """Place of a street through a node in ``lanes`` and ``speeds``."""
-        return node[0] if direction % 2 else len(self.columns) + node[1]
 
     def room(self, node: Node) -> float:
         """Metres from the middle of a junction to the end of its arms."""
         most = max(self.lanes[self.line(node, EAST)], self.lanes[self.line(node, NORTH)])
         return self.reach + 4.0 * (most - 1)
-
-    def place(self, node: Node) -> Pose:
-        """Middle of a junction, looking east."""
-        return Pose(self.columns[node[0]], self.rows[node[1]], 0.0)
 
 
 def varied_town(name: str) -> Builder:
@@ -81,15 +60,13 @@ def varied_town(name: str) -> Builder:
     rng = random.Random(f"varied town {seed}")
     grid = _drawn(rng, seed)
     builder = Builder(name)
-    nodes = [(i, j) for i in range(len(grid.columns)) for j in range(len(grid.rows))]
-    arms: dict[Node, dict[int, End]] = {node: {} for node in nodes}
-    for node in nodes:
-        for direction, other in ((EAST, (node[0] + 1, node[1])), (NORTH, (node[0], node[1] + 1))):
-            if other in arms and (node, direction) not in grid.closed:
-                _street(builder, grid, arms, node, other, direction)
-    for node in nodes:
+    arms: dict[Node, dict[int, End]] = {node: {} for node in grid.nodes()}
+    for node, other, direction in grid.roads():
+        if (node, direction) not in grid.closed:
+            _street(builder, grid, arms, node, other, direction)
+    for node, own in arms.items():
         _stubs(builder, grid, arms, node)
-        _junction(builder, grid, node, arms[node], rng)
+        _junction(builder, grid, node, own, rng)
     return builder
 
 
@@ -114,8 +91,8 @@ def _drawn(rng: random.Random, seed: int) -> VariedGrid:
         if (0 < j < rows - 1 if direction == EAST else 0 < i < columns - 1)
     ]
     return VariedGrid(
-        _offsets(rng, columns, long),
-        _offsets(rng, rows, long),
+        draw_offsets(rng, columns, long),
+        draw_offsets(rng, rows, long),
         tuple(lanes),
         tuple(speeds),
         rng.uniform(20.0, 28.0) if wide else rng.uniform(13.0, 17.0),
@@ -133,11 +110,6 @@ def _closed(rng: random.Random, streets: Sequence[tuple[Node, int]]) -> frozense
             found.append(((i, j), direction))
             used |= ends
     return frozenset(found)
-
-
-def _offsets(rng: random.Random, count: int, long: float) -> tuple[float, ...]:
-    steps = [rng.uniform(0.75, 1.35) * long for _ in range(count - 1)]
-    return tuple(accumulate(steps, initial=0.0))
 
 
 def _street(
@@ -168,14 +140,7 @@ def _stubs(
 ) -> None:
     """Open ends of streets at every second node of the border, and where a corner needs one."""
     i, j = node
-    outwards = [
-        direction
-        for direction, at_border in (
-            (EAST, i == len(grid.columns) - 1), (NORTH, j == len(grid.rows) - 1),
-            (WEST, i == 0), (SOUTH, j == 0),
-        )
-        if at_border
-    ]  # fmt: skip
+    outwards = grid.outwards(node)
     needed = max(3 - len(arms[node]), int(len(outwards) == 1 and (i + j) % 2 == 0))
     for direction in outwards[: max(needed, 0)]:
         line = grid.line(node, direction)
