@@ -845,7 +845,7 @@ def test_a_bridge_is_above_the_street_that_it_crosses_and_its_ramps_are_no_steps
                 other = ends[link.element_id, link.contact_point]  # type: ignore[index]
                 assert ends[name, own] == pytest.approx(other, abs=1e-6)
     (guess,) = [e for e in entries if e.source_id == "way 11" and "bridge" in e.reason]
-    assert guess.reason == "bridge: 6 m above the ground, as it crosses way 13"
+    assert guess.reason == "bridge: 6 m above the ground, as it crosses OSM way 13"
     assert guess.outcome.value == "guessed"
 
 

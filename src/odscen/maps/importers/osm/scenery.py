@@ -316,7 +316,7 @@ def _find_overpasses(
             source = f"way {ways[moved]}"
             reason = (
                 f"{said}: {abs(z):g} m {'above' if z > 0 else 'below'} the ground, as it crosses "
-                f"way {ways[1 - moved]}"
+                f"OSM way {ways[1 - moved]}"
             )
             rows.append(SceneryRow(True, source, reason, 0.4, source))
     return sources, rows
