@@ -97,7 +97,7 @@ def test_a_light_is_green_when_the_log_says(store: Workspace, tmp_path: Path) ->
     played, notes = play_controller_log(
         store, on_map(store, until=550.0), tmp_path / "log.csv", junction=JUNCTION, phases=PHASES
     )
-    assert notes == ("no phase is named for 'walk r1' and 'walk r3': red all the time",)
+    assert notes == ("no phase is named for walk r1 and walk r3: red all the time",)
     done = run(store, played, out=tmp_path / "run")
     for link, phase in ((3, "2"), (12, "2"), (14, "5"), (6, "8"), (21, "P2")):
         begin, end = {**GREENS, "P2": (0.0, 7.0)}[phase]
