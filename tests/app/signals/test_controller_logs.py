@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 from datetime import datetime, timedelta
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -278,11 +279,17 @@ def test_two_hours_of_a_real_log_are_played_back_to_a_second(
     done = run(store, played, out=tmp_path / "run")
     events = read_controller_log((theirs / "log.csv").read_bytes())
     for link, phase in ((3, 2), (12, 6), (4, 5), (6, 8)):
-        own = events.filter(pl.col("parameter") == phase, pl.col("event").is_in([1, 8]))
-        seconds = (own["time"] - START).dt.total_milliseconds() / 1000
-        shown = greens_shown(done.folder, link, 7190.0)
-        begins = seconds.filter((own["event"] == 1) & (seconds < 7190.0)).to_list()
-        ends = seconds.filter((own["event"] == 8) & (seconds < 7190.0)).to_list()
-        assert [a for a, _ in shown if a > 0] == pytest.approx([b for b in begins if b > 0], abs=1)
-        assert [b for _, b in shown if b < 7190] == pytest.approx(ends, abs=1)
-        assert len(ends) > 60
+        own = events.filter(pl.col("parameter") == phase, pl.col("event").is_in([1, 8, 10]))
+        seconds = ((own["time"] - START).dt.total_milliseconds() / 1000).to_list()
+        # Of one green the log has lost the begin of yellow: it ends with red.
+        greens = [
+            (begin, end)
+            for (begin, code), (end, _) in pairwise(zip(seconds, own["event"], strict=True))
+            if code == 1 and begin > 0.5 and end < 7000.0
+        ]
+        found = [green for green in greens_shown(done.folder, link, 7190.0) if green[0] > 0]
+        assert len(greens) > 60
+        for (a, b), (c, d) in zip(found, greens, strict=False):
+            assert abs(a - c) <= 1.0
+            assert abs(b - d) <= 1.0
+        assert len(found) >= len(greens)
