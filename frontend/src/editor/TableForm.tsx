@@ -149,7 +149,11 @@ export function TableForm({
         </Alert>
       )}
       <Group>
-        <FileButton accept={kind === "office" ? undefined : ".csv,.tsv,.txt,text/csv"} resetRef={reset} onChange={send}>
+        <FileButton
+          accept={kind === "office" ? undefined : ".csv,.tsv,.txt,text/csv"}
+          resetRef={reset}
+          onChange={send}
+        >
           {(props) => (
             <Button variant="light" loading={busy} disabled={chosen.stem !== null && !part.trim()} {...props}>
               <Trans>Choose a table</Trans>
