@@ -63,8 +63,8 @@ def arrivals(events: pl.DataFrame, detectors: pl.DataFrame) -> pl.DataFrame:
             since = round(float(now - greens[cycle]), 3) if cycle >= 0 else None
             rows.append((device, phase, stamp, shown, since))
     schema = {
-        "device": pl.String, "phase": pl.Int64, "time": pl.Datetime("ms"), "light": pl.String,
-        "in_cycle": pl.Float64,
+        "device": pl.String(), "phase": pl.Int64(), "time": pl.Datetime("ms"), "light": pl.String(),
+        "in_cycle": pl.Float64(),
     }  # fmt: skip
     return pl.DataFrame(rows, schema=schema, orient="row").sort("device", "phase", "time")
 
@@ -131,8 +131,8 @@ def split_failures(
             failed = busy >= OCCUPIED and late >= OCCUPIED
             rows.append((device, phase, over[0], float(yellows[0]) - green, busy, late, failed))
     schema = {
-        "device": pl.String, "phase": pl.Int64, "time": pl.Float64, "green": pl.Float64,
-        "green_occupancy": pl.Float64, "red_occupancy": pl.Float64, "failed": pl.Boolean,
+        "device": pl.String(), "phase": pl.Int64(), "time": pl.Float64(), "green": pl.Float64(),
+        "green_occupancy": pl.Float64(), "red_occupancy": pl.Float64(), "failed": pl.Boolean(),
     }  # fmt: skip
     table = pl.DataFrame(rows, schema=schema, orient="row").with_columns(
         begin=(pl.col("time") * 1000).round().cast(pl.Datetime("ms")).dt.truncate(f"{minutes}m")
@@ -174,7 +174,8 @@ def pedestrian_delays(events: pl.DataFrame, *, minutes: int = 15) -> pl.DataFram
                 pushed = None
             before = event
     schema = {
-        "device": pl.String, "phase": pl.Int64, "time": pl.Datetime("ms"), "delay": pl.Float64,
+        "device": pl.String(), "phase": pl.Int64(), "time": pl.Datetime("ms"),
+        "delay": pl.Float64(),
     }  # fmt: skip
     return (
         pl.DataFrame(rows, schema=schema, orient="row")
