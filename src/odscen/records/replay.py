@@ -6,13 +6,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from odscen.base.categories import Category
 from odscen.base.frames import SumoPose, sumo_to_xodr
 
 if TYPE_CHECKING:
     import polars as pl
 
+    from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.records.run_plan import Plan
 
+SPEED_ERROR = 0.1
+"""m/s by which SUMO's speed may differ from that of positions before it is replaced."""
+LANE_JOINT = 0.06
+"""Metres that positions slip where lanes meet: what SUMO's shortest lane is long, and rounding."""
+_JUMPED, _UNSEEN = 0.5, 2.0
+"""Metres, and m/s that SUMO's speed may leave out: further elsewhere is a jump and no speed."""
 
 _OPTIONAL = {"z": "z", "lane": "lane", "pos": "pos", "slope": "slope_deg"}
 
@@ -32,7 +40,8 @@ def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
     polars.DataFrame
         One row per road user and record, sorted by time; columns ``time``, ``id``, ``category``,
         ``row`` (of the plan), ``x``, ``y``, ``hdg``, ``speed``, and of ``z``, ``lane``, ``pos``,
-        ``slope_deg`` those that were recorded. Rows without a place are left out.
+        ``slope_deg`` those that were recorded. Rows without a place are left out. ``speed`` (m/s)
+        is that of the front's positions, see :func:`speeds_of_positions`.
     """
     import polars as pl
 
@@ -62,6 +71,8 @@ def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
         .sort("time", maintain_order=True)
     )
     x, y, angle, length = (rows[name].to_numpy() for name in ("x", "y", "angle", "length"))
+    time, row, speed = (rows[name].to_numpy() for name in ("time", "row", "speed"))
+    walking = (rows["category"] == Category.PEDESTRIAN).to_numpy()
     pose = sumo_to_xodr(SumoPose(x, y, 0.0, angle), length=length, net_offset=plan.net_offset)
     extra = [name for name in _OPTIONAL.values() if name in rows.columns]
     return rows.with_columns(
@@ -69,7 +80,74 @@ def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
         x=np.asarray(pose.x),
         y=np.asarray(pose.y),
         hdg=np.asarray(pose.hdg),
+        speed=speeds_of_positions(time, row, x, y, angle, speed, walking),
     ).select("time", "id", "category", "row", "x", "y", "hdg", "speed", *extra)
+
+
+def speeds_of_positions(
+    time: FloatArray,
+    row: IntArray,
+    x: FloatArray,
+    y: FloatArray,
+    angle_deg: FloatArray,
+    speed: FloatArray,
+    walking: BoolArray,
+) -> FloatArray:
+    """Speeds at which the fronts of road users really moved.
+
+    SUMO's speed is that along the centre line of a lane of the length that its edge has: it leaves
+    out what a vehicle moves aside, is that of another arc beside the centre, and of a person
+    that is moved it is none at all. Where the way from the record before differs from it, that
+    counts.
+
+    Parameters
+    ----------
+    time, row, x, y, angle_deg, speed
+        Of shape ``(N,)``, sorted by time: seconds, number of the road user, metres, SUMO's angle,
+        m/s.
+    walking
+        Who is on foot, of shape ``(N,)``.
+
+    Returns
+    -------
+    m/s, of shape ``(N,)``; first records, those after a gap or a jump, and those more than a second
+    after the one before, keep SUMO's.
+    """
+    if len(time) < 2:
+        return speed
+    order = np.argsort(row, kind="stable")
+    time, row, x, y, angle, old, walking = (
+        part[order] for part in (time, row, x, y, angle_deg, speed, walking)
+    )
+    passed = np.diff(time)
+    same = (row[1:] == row[:-1]) & (passed > 1e-6)
+    if not same.any():
+        return speed
+    step = float(np.median(passed[same]))
+    same &= (passed < 1.5 * step) & (step <= 1.0 + 1e-6)
+    passed = np.where(same, passed, 1.0)
+    # The arc over the chord between two places.
+    half = 0.5 * np.radians(np.abs(np.mod(np.diff(angle) + 180.0, 360.0) - 180.0))
+    half = np.clip(half, 1e-6, 0.5)
+    covered = np.hypot(np.diff(x), np.diff(y)) * half / np.sin(half) / passed
+    error = np.where(same, covered - old[1:], 0.0)
+    same &= np.abs(error) * passed < _JUMPED + _UNSEEN * passed
+    error = np.where(same, error, 0.0)
+    # Vehicles slip by centimetres where lanes meet, which is no speed unless it goes on.
+    slips = ~walking[1:] & (np.abs(error) * passed < LANE_JOINT)
+    error = np.where(slips, _median_of_three(error, same), error)
+    error[np.abs(error) <= SPEED_ERROR] = 0.0
+    found = np.empty_like(speed)
+    found[order] = np.maximum(old + np.concatenate(([0.0], error)), 0.0)
+    return found
+
+
+def _median_of_three(values: FloatArray, joined: BoolArray) -> FloatArray:
+    """Medians of each value and its neighbours, itself where one of them is not joined."""
+    before = np.concatenate((values[:1], np.where(joined[:-1], values[:-1], values[1:])))
+    after = np.concatenate((np.where(joined[1:], values[1:], values[:-1]), values[-1:]))
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    return np.clip(values, low, high)
 
 
 def _empty_positions() -> pl.DataFrame:

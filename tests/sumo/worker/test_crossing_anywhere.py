@@ -138,3 +138,66 @@ def test_killed_on_the_road_and_resumed_it_ends_with_the_same_bytes(
     assert resume(cut).status == "completed"
     assert results(cut) == results(alone)
     assert on_the_road(read(alone)).any()
+
+
+IN_THE_ROAD = [
+    (kind, ahead, speed, step)
+    for step in (0.1, 0.5)
+    for kind, ahead, speed in (
+        ("stands", 25.0, 6.0),
+        ("stands", 35.0, 8.0),
+        ("stands", 45.0, 10.0),
+        ("stands", 55.0, 12.0),
+        ("stands", 75.0, 13.5),
+        ("crosses", 35.0, 8.0),
+        ("crosses", 45.0, 10.0),
+        ("crosses", 55.0, 11.0),
+        ("walks along", 25.0, 6.0),
+        ("walks along", 35.0, 8.0),
+    )
+]
+
+
+def meet_in_the_road(
+    folder: Path, kind: str, ahead: float, speed: float, step: float, forced: Any = None
+) -> Told:
+    """Somebody steps into the ego's lane some metres ahead of it, and stays or walks there."""
+    y, x = 103.4, 228.0 + ahead
+    then = {
+        "stands": {"walk": {"to": [x, y], "speed": 2.5}},
+        "crosses": {"walk": {"to": [x, 106.6], "speed": 1.0}},
+        "walks along": {"walk": {"to": [278.0, y], "through": [[x, y]], "speed": 2.0}},
+    }[kind]
+    ego = {
+        "id": "ego", "category": "car", "spawn": node_at(TOWN, 228.0, y), "ego": True,
+        "goal": node_at(TOWN, 390.0, y), "initial_speed": speed,
+    }  # fmt: skip
+    anna = walker(x) | {"crosses_anywhere": False, "goal": walk_node_at(TOWN, x + 20.0, NEAR)}
+    start = {"time": {"after": step}}
+    rules = [{"id": "steps", "actor": "anna", "when": start, "then": [then]}]
+    if forced is not None:
+        rules.append({"id": "forced", "actor": "ego", "when": start, "then": [forced]})
+    return run(document(TOWN, [ego, anna], rules, step=step, until=25.0), folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "ahead", "speed", "step"), IN_THE_ROAD)
+def test_the_ego_stops_for_a_person_in_the_road(
+    tmp_path: Path, kind: str, ahead: float, speed: float, step: float
+) -> None:
+    found = meet_in_the_road(tmp_path / "run", kind, ahead, speed, step)
+    car, anna = found.tracks["ego"], found.tracks["anna"]
+    assert not [e for e in found.events if "collision" in e.kind or "contact" in e.kind]
+    assert car.speed.min() < 0.1
+    beside = np.abs(np.interp(car.time, anna.time, anna.y) - car.y) < 0.9 + 0.25
+    metres = (np.interp(car.time, anna.time, anna.x) - car.x)[beside]
+    assert metres.min() > 1.0  # of free road before the person
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [0.1, 0.5])
+def test_the_ego_does_not_stop_where_a_rule_forces_it_to_drive(tmp_path: Path, step: float) -> None:
+    forced = {"speed": {"to": 12.0, "over": 10.0}}
+    found = meet_in_the_road(tmp_path / "run", "stands", 35.0, 8.0, step, forced)
+    assert found.tracks["ego"].speed.min() >= 8.0
+    assert [e.kind for e in found.events if "anna" in (e.actor, e.partner)].count("collision") == 1

@@ -25,6 +25,7 @@ import numpy as np
 from odscen.base.categories import Category
 from odscen.base.stored_files import tables
 from odscen.figures.measures.figure import COUNT, Basis, Better, ReportSection, RunFigure
+from odscen.records.replay import LANE_JOINT, SPEED_ERROR
 from odscen.records.run_events import EventKind
 
 if TYPE_CHECKING:
@@ -139,13 +140,6 @@ JUMPED = 0.5
 """Metres that a road user is elsewhere than its speed says, beyond its lateral speed."""
 WALKED = 3.0
 """m/s that a pedestrian may be faster than recorded before that is a jump."""
-SPEED_ERROR = 0.1
-"""m/s between the recorded speed and that of positions."""
-LANE_JOINT = 0.06
-"""Metres that positions slip where lanes meet: what SUMO's shortest lane is long, and rounding."""
-LATERAL_OFFSET = 0.5
-"""Metres that a vehicle may be beside the centre of its lane, along which SUMO's speed is: in a
-curve the positions are slower or faster by yaw rate times offset."""
 BACKED = 0.1
 """Metres backwards from one record to the next."""
 YAW_SLACK = 0.05
@@ -279,12 +273,12 @@ def _check_part(
     width = np.array([actor.width for actor in plan.actors])[row]
     names = [str(actor.category) for actor in plan.actors]
     walking = np.array([name == Category.PEDESTRIAN for name in names], dtype=bool)[row]
-    limits = np.array([_bounds_row(BOUNDS.get(name, _WALKS)) for name in names])[row]
+    limits = np.array([_bounds_row(BOUNDS.get(name, _WALKS)) for name in names]).T[:, row]
     if not len(rows):
         return _empty_findings()
     steps = _check_steps(time, row, x, y, hdg, speed, length, walking, limits, step)
     if lanes is not None:
-        recorded = rows["lane"].to_list() if "lane" in rows.columns else [None] * len(rows)
+        recorded = rows["lane"] if "lane" in rows.columns else None
         steps += _off_road(time, x, y, speed, walking, recorded, lanes, step)
     steps += _overlaps(time, row, x, y, hdg, length, width, step)
     return _join_findings(steps, rows, plan, forced, lanes, step)
@@ -322,7 +316,7 @@ def _check_steps(
     joined = (row[1:] == row[:-1]) & (dt > 1e-6) & (dt < 1.5 * step)
     now = np.flatnonzero(joined)
     later, dt = now + 1, dt[now]
-    lateral_bound, _, gain_bound, brake_bound, _, radius = limits[later].T
+    lateral_bound, radius = limits[0, later], limits[5, later]
     walking = walking[later]
 
     def keep(
@@ -363,14 +357,8 @@ def _check_steps(
     half = np.minimum(np.abs(turned), 2.0) / 2.0
     covered = chord * np.where(half > 1e-6, half / np.maximum(np.sin(half), 1e-9), 1.0) / dt
     error = np.maximum(np.maximum(chord / dt - high, low - covered), 0.0)
-    excusable = SPEED_ERROR + (LATERAL_OFFSET * np.abs(turned) + LANE_JOINT) / dt
+    excusable = SPEED_ERROR + LANE_JOINT / dt
     keep(MotionKind.RECORDED_SPEED, smooth & (error > excusable), error, excusable)
-
-    gain = (speed[later] - speed[now]) / dt
-    keep(MotionKind.ACCELERATION, gain > gain_bound + 0.05, gain, gain_bound)
-    keep(MotionKind.BRAKING, -gain > brake_bound + 0.05, -gain, brake_bound)
-    hard = (-gain > HARD_BRAKING + 0.05) & ~walking
-    keep(MotionKind.HARD_BRAKING, hard, -gain, HARD_BRAKING)
 
     turns = np.abs(turned)
     possible = np.where(radius > 0.0, chord / np.maximum(radius * length[later], 1e-9), np.inf)
@@ -380,6 +368,19 @@ def _check_steps(
     # Means over windows: velocities from positions, speeds as recorded.
     count = max(1, round(WINDOW / step))
     stretch = np.concatenate(([0], np.cumsum(~joined)))
+    first = np.arange(max(0, len(time) - count))
+    first = first[stretch[first] == stretch[first + count]]
+    last = first + count
+    gain = (speed[last] - speed[first]) / (time[last] - time[first])
+    drives = limits[0, last] < math.inf
+    for kind, values, bounds in (
+        (MotionKind.ACCELERATION, gain, limits[2, last]),
+        (MotionKind.BRAKING, -gain, limits[3, last]),
+        (MotionKind.HARD_BRAKING, -gain, np.where(drives, HARD_BRAKING, math.inf)),
+    ):
+        at = np.flatnonzero(values > bounds + 0.05)
+        if len(at):
+            found.append(_Step(kind, last[at], values[at], bounds[at]))
     first = np.arange(max(0, len(time) - 2 * count))
     first = first[stretch[first] == stretch[first + 2 * count]]
     mid, last = first + count, first + 2 * count
@@ -390,12 +391,12 @@ def _check_steps(
     sideways = np.abs(change_y * np.cos(hdg[mid]) - change_x * np.sin(hdg[mid])) / span
     jumps = np.concatenate(([0], np.cumsum(_flags(jumped, later, len(time)))))
     whole = jumps[last + 1] == jumps[first + 1]
-    bound = limits[mid, 1]
+    bound = limits[1, mid]
     at = np.flatnonzero(whole & (sideways > bound + 0.1))
     if len(at):
         found.append(_Step(MotionKind.LATERAL_ACCELERATION, mid[at], sideways[at], bound[at]))
     jerk = np.abs((speed[last] - speed[mid]) / two - (speed[mid] - speed[first]) / one) / span
-    bound = limits[mid, 4]
+    bound = limits[4, mid]
     at = np.flatnonzero(whole & (jerk > bound + 0.1))
     if len(at):
         found.append(_Step(MotionKind.JERK, mid[at], jerk[at], bound[at]))
@@ -422,7 +423,7 @@ def _off_road(
     y: FloatArray,
     speed: FloatArray,
     walking: BoolArray,
-    names: Sequence[str | None],
+    names: pl.Series | None,
     lanes: RoadLanes,
     step: float,
 ) -> list[_Step]:
@@ -438,7 +439,8 @@ def _off_road(
     # Most are on the lane that is recorded, which is the front's; the others may be on any.
     beyond = np.full(len(rows), np.inf)
     number = {lane: index for index, lane in enumerate(lanes.names)}
-    own = np.array([number.get(names[k] or "", -1) for k in rows.tolist()], dtype=np.int64)
+    known_lanes = [None] * len(rows) if names is None else names.gather(rows).to_list()
+    own = np.array([number.get(lane or "", -1) for lane in known_lanes], dtype=np.int64)
     known = np.flatnonzero(own >= 0)
     beyond[known] = shapely.distance(points[known], lines[own[known]]) - half[own[known]]
     elsewhere = np.flatnonzero(beyond > OFF_LANE)
@@ -581,7 +583,7 @@ def _join_findings(
     if not steps:
         return _empty_findings()
     columns = rows.columns
-    lane_names = rows["lane"].to_list() if "lane" in columns else None
+    lane_names = rows["lane"] if "lane" in columns else None
     time, row, x, y = (rows[name].to_numpy() for name in ("time", "row", "x", "y"))
     found: list[dict[str, object]] = []
     for kind, places, excesses, limits, partners in steps:
@@ -641,7 +643,7 @@ def _find_cause(
 
 
 def _cause_by_lane(
-    names: Sequence[str | None] | None,
+    names: pl.Series | None,
     row: IntArray,
     start: int,
     end: int,
@@ -650,9 +652,8 @@ def _cause_by_lane(
     """A change of lanes within a few records, a junction, or the lane itself."""
     if names is None or lanes is None:
         return MotionCause.LANE
-    around = [
-        names[k] for k in range(max(0, start - 3), min(len(row), end + 4)) if row[k] == row[start]
-    ]
+    near = slice(max(0, start - 3), end + 4)
+    around = names[near].filter(row[near] == row[start]).to_list()
     for before, after in pairwise(around):
         if before and after and before != after:
             edge = lanes.edges.get(before)

@@ -104,7 +104,8 @@ class _RunningSlice:
         more = self._end < self._plan.until and self._routes.more(offset)
         with _open_slice_session(self._slice_arguments(part), self._number) as session:
             self._compare_restored(session, stepper)
-            now = stepper.run(session, self._end, more=more)
+            goes_on = self._end < self._plan.until
+            now = stepper.run(session, self._end, more=more, saved=goes_on)
             last = self._is_last(session, stepper, now, more=more)
             present = session.present()
             running = session.running()

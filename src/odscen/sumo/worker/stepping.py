@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING
 
@@ -92,19 +93,24 @@ class Stepper:
         """Whether a rule may let an actor appear that is not there yet."""
         return self.story is not None and self.story.waits
 
-    def run(self, session: Session, until: float, *, more: bool = False) -> float:
+    def run(
+        self, session: Session, until: float, *, more: bool = False, saved: bool = False
+    ) -> float:
         """Step until ``until``, or until no road user is left; simulated seconds then.
 
         Parameters
         ----------
         more
             Whether road users are to come that this simulation does not know of.
+        saved
+            Whether the state then is saved: no change of lanes begins that would not be over.
         """
         watch, clock, now = self._watch, time.monotonic, session.time
         if self.story is not None:
             self.story.begin(session)
         if self._start is None:
             self._start = now, self.recorder.departed
+        held = self._begin_of_hold(session, now, until) if saved else math.inf
         begin, waited = clock(), 0.0
         while now < until and not self.over and (more or session.expected() > 0 or self.waits):
             if watch is not None:
@@ -115,6 +121,8 @@ class Stepper:
             self._take_rules(session)
             if self.over:
                 break
+            if now >= held:
+                session.hold_lanes(but=self._moved_by_others())
             now = self._make_step(session, now)
             if clock() - self._sent >= MESSAGE_PAUSE:
                 self._sent = clock()
@@ -123,6 +131,13 @@ class Stepper:
         self._busy += clock() - begin - waited
         self._finish_run(session, now, more=more)
         return now
+
+    def _begin_of_hold(self, session: Session, begin: float, until: float) -> float:
+        """From when on no vehicle begins to change lanes: half of the time is free at least."""
+        takes = session.lane_change_duration
+        if takes <= 0.0 or self.behaviour is not None:
+            return math.inf
+        return max(until - takes - 0.5 * self._plan.step_length, 0.5 * (begin + until))
 
     def _make_step(self, session: Session, now: float) -> float:
         """Make a step, with what measures and rules do before and after it; seconds then."""

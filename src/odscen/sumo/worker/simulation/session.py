@@ -31,7 +31,7 @@ from odscen.sumo.worker.simulation.stop_doors import StopDoors
 from odscen.sumo.worker.simulation.stopped_vehicles import StoppedVehicles
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
     from pathlib import Path
 
 
@@ -50,6 +50,8 @@ _HAPPENINGS = (
 """Getters of numbers and lists, as in :class:`StepLists`."""
 
 
+_NO_CHANGES = 0
+"""``setLaneChangeMode``: SUMO begins none."""
 _BESIDE_END = 5.0
 """Metres before the end of an edge where a vehicle waits beside the road."""
 
@@ -316,6 +318,25 @@ class Session:
                 domain.getTypeID(name)
                 return True
         return False
+
+    @cached_property
+    def lane_change_duration(self) -> float:
+        """Seconds that a change of lanes takes; 0 where vehicles have it done in a step."""
+        with suppress(*self._errors):
+            return max(0.0, float(self._simulation.getOption("lanechange.duration")))
+        return 0.0
+
+    def hold_lanes(self, *, but: Collection[str]) -> None:
+        """Let no vehicle begin a change of lanes any more, but those named.
+
+        For the last seconds before the state is saved: SUMO's state does not say how far a change
+        has come, and who is in one would stand on a lane again with the next step. What is held
+        is not in the state either.
+        """
+        hold = self._sumo.vehicle.setLaneChangeMode
+        for vehicle in self._sumo.vehicle.getIDList():
+            if vehicle not in but:
+                hold(vehicle, _NO_CHANGES)
 
     def save(self, path: Path) -> None:
         """Write the state to ``path``, which ends in ``.xml.gz``.
