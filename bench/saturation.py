@@ -6,8 +6,10 @@ HCM gives as 1,900 cars per hour and lane; on a straight approach at 50 km/h, an
 with a stop and a yield sign, and from the major road, at ``t_junction_signs`` without its
 crosswalks, against the potential capacity of HCM 7th edition, chapter 20; entries of
 ``roundabout`` against HCM 2010, chapter 22. Major and circulating traffic comes at random (Poisson)
-and is counted where it conflicts; the minor queue never ends. Vehicles are cars with normal
-drivers, as runs have them.
+and is counted where it conflicts; the minor queue never ends. Left turns through gaps of one lane
+at the lights of ``signal_crossing``, 34 s of green in 69, against chapter 31 (critical and
+follow-up headway 4.5 and 2.5 s, two vehicles at the end of each green). Vehicles are cars with
+normal drivers, as runs have them.
 ``ODSCEN_BENCH_STEPS`` (0.1,0.2,0.5,1) and ``ODSCEN_BENCH_SEEDS`` (1) widen or narrow it.
 """
 
@@ -25,7 +27,9 @@ from xml.etree import ElementTree as ET
 
 from bench.capacity import HOUR, _build, _tool
 from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.figures.by_place.capacity import SNEAKERS
 from odscen.scenario.document.drivers_document import Drivers
+from odscen.scenario.signals.webster import CRITICAL_GAP, FOLLOW_UP
 from odscen.sumo.realize.driving import draw_factor, driver
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.weather_effects import NO_EFFECT, WeatherEffect
@@ -49,7 +53,7 @@ class Turn:
     ``own`` is the lane that it starts from, ``over`` are the routes of those who go first,
     ``counted`` the lanes at whose ends they are counted; ``critical`` and ``follow_up`` are the
     HCM's headways, s (the critical one of a left turn at a T-junction is 0.7 s less than at a
-    crossing); none at a roundabout.
+    crossing); none at a roundabout. ``starts`` are the lanes in which it and the others depart.
     """
 
     map: str
@@ -59,6 +63,7 @@ class Turn:
     counted: tuple[str, ...]
     critical: float = 0.0
     follow_up: float = 0.0
+    starts: tuple[str, str] = ("0", "0")
 
     def capacity(self, volume: float) -> float:
         """Vehicles per hour that the HCM says."""
@@ -89,6 +94,14 @@ TURNS = {
 }  # fmt: skip
 
 
+LEFT_GREEN, CYCLE = 34.0, 69.0
+"""Seconds, of the light at which turns go through gaps."""
+LEFT_TURN = Turn(
+    "signal_crossing", "1.0.f 1.1.f 4.1.b 4.0.b", "1.1.f_2", ("3.0.f 3.1.f 1.1.b 1.0.b",),
+    ("3.1.f_1",), CRITICAL_GAP, FOLLOW_UP, ("2", "1"),
+)  # fmt: skip
+
+
 def main() -> None:
     steps = os.environ.get("ODSCEN_BENCH_STEPS", "0.1,0.2,0.5,1").split(",")
     seeds = [int(seed) for seed in os.environ.get("ODSCEN_BENCH_SEEDS", "1").split(",")]
@@ -96,6 +109,7 @@ def main() -> None:
         folder = Path(name)
         _saturation_table(folder, steps, seeds)
         _turn_table(folder, steps, seeds)
+        _permissive_table(folder, steps, seeds)
 
 
 def _saturation_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
@@ -139,12 +153,65 @@ def _turn_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
         for step in steps:
             cells = []
             for volume in VOLUMES:
-                found = [_turn(folder, nets[turn.map], turn, volume, step, s) for s in seeds]
+                found = [_entered(folder, nets[turn.map], turn, volume, step, s) for s in seeds]
                 met, served, collided = (statistics.fmean(v) for v in zip(*found, strict=True))
                 share = served / statistics.fmean(turn.capacity(one[0]) for one in found)
                 hit = f", {collided:g} collisions" if collided else ""
                 cells.append(f"{met:.0f}: {served:.0f} ({share:.2f}{hit})")
             print(f"| {name}; {step} s | {'; '.join(cells)} |", flush=True)
+
+
+def permissive_capacity(volume: float) -> float:
+    """Left turns an hour through gaps of oncoming traffic: HCM chapter 31."""
+    arriving, leaving = volume / HOUR, HCM_SATURATION / HOUR
+    queue = arriving * (CYCLE - LEFT_GREEN) / (leaving - arriving)
+    through = LEFT_TURN.capacity(volume)
+    return (through * max(0.0, LEFT_GREEN - queue) + HOUR * SNEAKERS) / CYCLE
+
+
+def _permissive_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
+    print("\n| permissive left turn at lights, veh/h, and share of HCM's; step | oncoming |")
+    print("|---|---|")
+    net = folder / "lights.net.xml"
+    _build(MAPS / "signal_crossing.xodr", net)
+    for step in steps:
+        cells = []
+        for volume in VOLUMES:
+            found = [_permissive(folder, net, volume, step, seed) for seed in seeds]
+            met, served, collided = (statistics.fmean(v) for v in zip(*found, strict=True))
+            share = served / permissive_capacity(met)
+            hit = f", {collided:g} collisions" if collided else ""
+            cells.append(f"{met:.0f}: {served:.0f} ({share:.2f}{hit})")
+        print(f"| {step} s | {'; '.join(cells)} |", flush=True)
+
+
+def _permissive(
+    folder: Path, net: Path, volume: int, step: str, seed: int
+) -> tuple[float, float, float]:
+    """Oncoming vehicles and left turns, an hour, and collisions."""
+    root = ET.parse(net).getroot()
+    light = next(root.iter("tlLogic")).get("id", "")
+    roads = {
+        int(link.get("linkIndex", 0)): (link.get("from"), link.get("dir"))
+        for link in root.iter("connection")
+        if link.get("tl") == light
+    }
+    shown = [roads[index] for index in sorted(roads)]
+    phases = "".join(
+        f'<phase duration="{seconds}" state="'
+        + "".join(
+            "r" if road not in ("1.1.f", "3.1.f") else left if turn == "l" else other
+            for road, turn in shown
+        )
+        + '"/>'
+        for seconds, left, other in (
+            (LEFT_GREEN, "g", "G"),
+            (YELLOW, "y", "y"),
+            (CYCLE - LEFT_GREEN - YELLOW, "r", "r"),
+        )
+    )
+    program = f'<tlLogic id="{light}" type="static" programID="gaps" offset="0">{phases}</tlLogic>'
+    return _entered(folder, net, LEFT_TURN, volume, step, seed, program)
 
 
 def straight_road(net: Path, *, limit: float = 13.89) -> None:
@@ -199,20 +266,20 @@ def saturation_flow(
     return HOUR / statistics.fmean(headways)
 
 
-def _turn(
-    folder: Path, net: Path, turn: Turn, volume: int, step: str, seed: int
+def _entered(
+    folder: Path, net: Path, turn: Turn, volume: int, step: str, seed: int, program: str = ""
 ) -> tuple[float, float, float]:
     """Conflicting volume and capacity, vehicles per hour, and collisions."""
     rng = random.Random(seed)
     end = WARM_UP + HOUR
-    departs = [(k * 1.8, turn.route, "0") for k in range(int(end / 1.8))]
+    departs = [(k * 1.8, turn.route, turn.starts[0]) for k in range(int(end / 1.8))]
     for route in turn.over:
         time = 0.0
         while (time := time + rng.expovariate(volume / len(turn.over) / HOUR)) < end:
-            departs.append((time, route, "0"))
+            departs.append((time, route, turn.starts[1]))
     loops, lanes = folder / "loop.xml", (turn.own, *turn.counted)
     (folder / "extra.xml").write_text(
-        "<additional>"
+        f"<additional>{program}"
         + "".join(
             f'<inductionLoop id="{lane}" lane="{lane}" pos="-0.5" period="{WARM_UP:g}"'
             f' file="{loops}"/>'

@@ -198,6 +198,22 @@ def test_greens_that_did_not_clear_the_queue_say_what_a_permitted_turn_carries()
     assert left == [pytest.approx(20.0), pytest.approx(20.0)], "4 in each of 5 greens, not 13"
 
 
+def test_who_turns_on_yellow_or_when_oncoming_green_has_ended_is_in_what_a_turn_carries() -> None:
+    """Oncoming traffic has red after 25 s, the turn 5 s later and 3 s of yellow."""
+    states = pl.DataFrame(
+        [("J1", 60.0 * cycle + time, state) for cycle in range(10) for time, state in
+         ((0.0, "gGG"), (25.0, "GGr"), (30.0, "yyr"), (33.0, "rrr"))],
+        schema=("light", "time", "state"), orient="row",
+    )  # fmt: skip
+    served = [(":l", 60.0 * n + at, 100.0) for n in range(10) for at in (10.0, 26.0, 28.0, 31.0)]
+    flows = saturation_flows(passed((":t", 1.0, 0.0)), GROUPS)
+    found = capacity_sums(
+        shown_greens([LIGHT], states, CLOCK, FACTS), flows, passed(*served), GROUPS, FACTS
+    )
+    left = found.filter(pl.col("lane_group") == LEFT)["capacity"].to_list()
+    assert left == [pytest.approx(20.0), pytest.approx(20.0)], "4 in each of 5 greens"
+
+
 def test_demand_above_capacity_is_level_f_and_short_intervals_have_no_ratio() -> None:
     light = STATES.clear()
     nobody = passed(*[(":t", float(k), 0.0) for k in range(30)])

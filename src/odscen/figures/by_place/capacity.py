@@ -18,7 +18,8 @@ A connection that has green together with vehicles to which it gives way (permit
 what their gaps let through: of a gap of ``h`` seconds ``floor((h - t_c) / t_f) + 1`` vehicles if
 ``h >= t_c``, with HCM's critical gap and follow-up time of permitted left turns, and
 :data:`SNEAKERS` more at the end of each green. Where :data:`FEWEST_GREENS` greens or more of this
-run did not clear the queue, all of it is taken times what they let through in proportion.
+run did not clear the queue, all of it is taken times what they let through in proportion, with the
+green of that turn that follows at once, and those who enter while the light is yellow.
 Pedestrians to whom turns give way are not considered otherwise. Movements without lights are in
 :mod:`odscen.figures.by_place.unsignalised`.
 """
@@ -63,6 +64,15 @@ class _Green(NamedTuple):
     time: float
     until: float
     permitted: bool
+
+
+class _Turn(NamedTuple):
+    """A green with gaps in it: its interval, from when to when, and vehicles it has room for."""
+
+    interval: float
+    begin: float
+    end: float
+    number: float
 
 
 def shown_greens(
@@ -296,56 +306,65 @@ def _link_capacities(
     for via, by_begin in shown.items():
         foes = [entries.get(lane, nothing)[:, 1] for lane in before[via]]
         opposing = np.sort(np.concatenate(foes)) if foes else np.zeros(0)
-        turns = [
-            (begin, time, until, through_gaps(opposing, time, until, most=flow_of[via]))
-            for begin, own in by_begin.items()
-            for time, until in _merge_spans([green for green in own if green.permitted])
-        ]
-        share = _as_driven(entries.get(via, nothing), turns)
-        totals = {
-            begin: sum(green.until - green.time for green in own if not green.permitted)
-            * flow_of[via]
-            / 3600.0
-            for begin, own in by_begin.items()
-        }
-        for begin, _, _, number in turns:
-            totals[begin] += share * number
+        flow = flow_of[via] / 3600.0
+        totals = dict.fromkeys(by_begin, 0.0)
+        turns, starts = [], []
+        for begin, own in by_begin.items():
+            for span in _merge_spans(own):
+                starts.append(span[0].time)
+                gaps = _merge_spans(green for green in span if green.permitted)
+                number = flow * sum(
+                    green.until - green.time for green in span if not green.permitted
+                )
+                if gaps:
+                    number += sum(
+                        through_gaps(opposing, part[0].time, part[-1].until, most=flow_of[via])
+                        for part in gaps
+                    )
+                    turns.append(_Turn(begin, span[0].time, span[-1].until, number))
+                else:
+                    totals[begin] += number
+        share = _as_driven(entries.get(via, nothing), turns, np.sort(starts))
+        for turn in turns:
+            totals[turn.interval] += share * turn.number
         found += [(via, begin, total) for begin, total in sorted(totals.items())]
     schema = {"via": pl.String, "begin": pl.Float64, "capacity": pl.Float64}
     return pl.DataFrame(sorted(found), schema=schema, orient="row")
 
 
-def _as_driven(entries: FloatArray, turns: Sequence[tuple[float, float, float, float]]) -> float:
-    """What greens that did not clear the queue let through, as a share of what their gaps would.
+def _as_driven(entries: FloatArray, turns: Sequence[_Turn], starts: FloatArray) -> float:
+    """What greens that did not clear the queue let through, as a share of what they have room for.
 
     Parameters
     ----------
     entries
-        ``(K, 2)``, when vehicles came to the queue and when they entered the junction.
-    turns
-        Interval, begin and end of each green, and vehicles that its gaps have room for.
+        ``(K, 2)``, when vehicles came to the queue and when they entered the junction, ascending.
+    starts
+        ``(G,)`` when greens of the connection begin, ascending.
     """
     import numpy as np
 
     due, time = entries[:, 0], entries[:, 1]
     greens, served, room = 0, 0, 0.0
-    for _, begin, end, number in turns:
-        if np.any((due < begin) & (time > end)):
+    for turn in turns:
+        # Up to the next green: who enters while the light is yellow is driven, too.
+        later = starts[starts > turn.begin]
+        first, last = np.searchsorted(time, (turn.begin, later[0] if len(later) else np.inf))
+        if last < len(time) and due[first] < turn.begin and due[last] < turn.end:
             greens += 1
-            # Who waits in the junction enters before the green ends; a step is a second at most.
-            served += int(np.sum((time >= begin) & (time < end + 1.0)))
-            room += number
+            served += int(last - first)
+            room += turn.number
     return served / room if greens >= FEWEST_GREENS and room else 1.0
 
 
-def _merge_spans(greens: Iterable[_Green]) -> list[tuple[float, float]]:
-    """Spans without a break between them as one."""
-    found: list[tuple[float, float]] = []
-    for time, until, _ in sorted(greens):
-        if found and time <= found[-1][1]:
-            found[-1] = found[-1][0], until
+def _merge_spans(greens: Iterable[_Green]) -> list[list[_Green]]:
+    """Greens without a break between them together, in the order of time."""
+    found: list[list[_Green]] = []
+    for green in sorted(greens):
+        if found and green.time <= found[-1][-1].until:
+            found[-1].append(green)
         else:
-            found.append((time, until))
+            found.append([green])
     return found
 
 
