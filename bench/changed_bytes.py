@@ -25,7 +25,7 @@ from odscen.base.errors import DamagedError, InputError, OdscenError
 
 WHOLE = 4000
 OTHERS = 24
-LOCKS = (".lock",)
+PASSING = (".lock", ".part")
 Reader = Callable[[], Any]
 
 
@@ -69,7 +69,7 @@ class Folder:
         return FOLDERS[self.kind](self)
 
     def files(self) -> list[str]:
-        """Files that readers compute with; locks, logs that are only added to and pages are not."""
+        """Files that readers compute with; locks, logs, pages and files in the making are not."""
         found = (path for path in self.path.rglob("*") if path.is_file())
         names = sorted(path.relative_to(self.path).as_posix() for path in found)
         return [name for name in names if not _is_left(self.kind, name)]
@@ -77,7 +77,7 @@ class Folder:
 
 def _is_left(kind: str, name: str) -> bool:
     """Whether nothing is computed from a file: docs/strangers.md lists these."""
-    if name.endswith(LOCKS):
+    if name.endswith(PASSING):
         return True
     if kind == "interrupted run" and name == "sumo.log":
         return True
