@@ -1,11 +1,11 @@
 """Bytes of stored folders changed one after the other: who reads on as if nothing had happened.
 
-``python -m bench changed_bytes [--most N] [--kinds KIND...]``: of a finished run, an interrupted
-one, a study, a sweep, a dataset and the results of a suite each byte of each file is changed, and
-every reader asked: commands, exports, what resumes, and the routes of the page. Small files are
-changed byte by byte; of those with more than :data:`WHOLE` bytes as many are changed, spread over
-the file. The first reader of a kind is asked about each, the others about :data:`OTHERS` bytes of
-each file. ``--most`` changes so many at random instead.
+``python -m bench changed_bytes [--most N] [--kinds KIND...]``: of a map, a finished run, an
+interrupted one, a study, a sweep, a dataset and the results of a suite each byte of each file is
+changed, and every reader asked: commands, exports, what resumes, and the routes of the page. Small
+files are changed byte by byte; of those with more than :data:`WHOLE` bytes as many are changed,
+spread over the file. The first reader of a kind is asked about each, the others about
+:data:`OTHERS` bytes of each file. ``--most`` changes so many at random instead.
 """
 
 from __future__ import annotations
@@ -59,6 +59,8 @@ class Folder:
 
     @property
     def path(self) -> Path:
+        if self.kind == "map":
+            return next((self.workspace / "maps").glob("*/map.json")).parent
         known = {"run": "done", "interrupted run": "sliced"}
         if self.kind in known:
             return self.workspace / "runs" / known[self.kind]
@@ -100,6 +102,23 @@ class _Told:
     def started(self) -> None: ...
 
     def advanced(self, *_: Any) -> None: ...
+
+
+def _map_readers(folder: Folder) -> dict[str, Reader]:
+    from odscen.maps.store import Workspace
+
+    place, name = Workspace.open(folder.workspace), folder.path.name
+
+    def ask_doctor() -> None:
+        if place.stored(name).damaged():
+            raise InputError("damaged")
+
+    def read_all() -> None:
+        entry = place.map(name)
+        for key in entry.info["files"]:
+            entry.read(key)
+
+    return {"doctor": ask_doctor, "whoever opens it": read_all}
 
 
 def _run_readers(folder: Folder) -> dict[str, Reader]:
@@ -245,6 +264,7 @@ def _page(root: Path, *targets: str) -> dict[str, Reader]:
 
 
 FOLDERS: Mapping[str, Callable[[Folder], dict[str, Reader]]] = {
+    "map": _map_readers,
     "run": _run_readers,
     "interrupted run": _interrupted_readers,
     "study": _study_readers,
