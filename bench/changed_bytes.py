@@ -5,7 +5,8 @@ interrupted one, a study, a sweep, a dataset and the results of a suite each byt
 changed, and every reader asked: commands, exports, what resumes, and the routes of the page. Small
 files are changed byte by byte; of those with more than :data:`WHOLE` bytes as many are changed,
 spread over the file. The first reader of a kind is asked about each, the others about
-:data:`OTHERS` bytes of each file. ``--most`` changes so many at random instead.
+:data:`OTHERS` bytes of each file. ``--whole`` sets another number of bytes of each file, and
+``--most`` changes so many at random instead.
 """
 
 from __future__ import annotations
@@ -322,15 +323,20 @@ def changed_byte(folder: Path, name: str, place: int, bit: int, kept: Path) -> I
                     shutil.copy2(path, there)
 
 
-def places_of(size: int) -> list[int]:
-    """Each byte, or :data:`WHOLE` of them spread over the file, its first and last among them."""
-    if size <= WHOLE:
+def places_of(size: int, most: int = WHOLE) -> list[int]:
+    """Each byte, or so many of them spread over the file, its first and last among them."""
+    if size <= most:
         return list(range(size))
-    return sorted({round(n * (size - 1) / (WHOLE - 1)) for n in range(WHOLE)})
+    return sorted({round(n * (size - 1) / (most - 1)) for n in range(most)})
 
 
 def unnoticed(
-    folder: Folder, *, most: int | None = None, seed: int = 0, spread: int = OTHERS
+    folder: Folder,
+    *,
+    most: int | None = None,
+    seed: int = 0,
+    spread: int = OTHERS,
+    whole: int = WHOLE,
 ) -> Found:
     """Change bytes of a folder and ask its readers; ``most`` at random, or all that are due."""
     readers = folder.readers()
@@ -345,7 +351,7 @@ def unnoticed(
     else:
         first = next(iter(readers))
         for name in files:
-            places = places_of((folder.path / name).stat().st_size)
+            places = places_of((folder.path / name).stat().st_size, whole)
             some = set(places[:: max(1, len(places) // spread)]) | {places[-1]}
             due += [(name, at, list(readers) if at in some else [first]) for at in places]
     asked, found = 0, []
@@ -371,6 +377,7 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="bench changed_bytes")
     options.add_argument("--most", type=int, help="bytes of each kind, at random")
     options.add_argument("--kinds", nargs="+", choices=list(FOLDERS), default=list(FOLDERS))
+    options.add_argument("--whole", type=int, default=WHOLE, help="most bytes of each file")
     options.add_argument("--seed", type=int, default=0)
     asked = options.parse_args()
     from bench.fuzz.limits import Limits
@@ -388,7 +395,7 @@ def main() -> None:
             files = folder.files()
             size = sum((folder.path / one).stat().st_size for one in files)
             begun = time.perf_counter()
-            found = unnoticed(folder, most=asked.most, seed=asked.seed)
+            found = unnoticed(folder, most=asked.most, seed=asked.seed, whole=asked.whole)
             took = time.perf_counter() - begun
             print(
                 f"| {kind} | {len(files)} | {size:,} | {found.changed:,} | {found.asked:,} "
