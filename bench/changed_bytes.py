@@ -1,11 +1,12 @@
 """Bytes of stored folders changed one after the other: who reads on as if nothing had happened.
 
-``python -m bench changed_bytes [--most N] [--kinds KIND...]``: of a finished run, an interrupted
-one, a study, a sweep, a dataset and the results of a suite each byte of each file is changed, and
-every reader asked: commands, exports, what resumes, and the routes of the page. Small files are
-changed byte by byte; of those with more than :data:`WHOLE` bytes as many are changed, spread over
-the file. The first reader of a kind is asked about each, the others about :data:`OTHERS` bytes of
-each file. ``--most`` changes so many at random instead.
+``python -m bench changed_bytes [--most N] [--kinds KIND...]``: of a map, a finished run, an
+interrupted one, a study, a sweep, a dataset and the results of a suite each byte of each file is
+changed, and every reader asked: commands, exports, what resumes, and the routes of the page. Small
+files are changed byte by byte; of those with more than :data:`WHOLE` bytes as many are changed,
+spread over the file. The first reader of a kind is asked about each, the others about
+:data:`OTHERS` bytes of each file. ``--whole`` sets another number of bytes of each file, and
+``--most`` changes so many at random instead.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from odscen.base.errors import DamagedError, InputError, OdscenError
 
 WHOLE = 4000
 OTHERS = 24
-LOCKS = (".lock",)
+PASSING = (".lock", ".part")
 Reader = Callable[[], Any]
 
 
@@ -59,6 +60,8 @@ class Folder:
 
     @property
     def path(self) -> Path:
+        if self.kind == "map":
+            return next((self.workspace / "maps").glob("*/map.json")).parent
         known = {"run": "done", "interrupted run": "sliced"}
         if self.kind in known:
             return self.workspace / "runs" / known[self.kind]
@@ -69,7 +72,7 @@ class Folder:
         return FOLDERS[self.kind](self)
 
     def files(self) -> list[str]:
-        """Files that readers compute with; locks, logs that are only added to and pages are not."""
+        """Files that readers compute with; locks, logs, pages and files in the making are not."""
         found = (path for path in self.path.rglob("*") if path.is_file())
         names = sorted(path.relative_to(self.path).as_posix() for path in found)
         return [name for name in names if not _is_left(self.kind, name)]
@@ -77,7 +80,7 @@ class Folder:
 
 def _is_left(kind: str, name: str) -> bool:
     """Whether nothing is computed from a file: docs/strangers.md lists these."""
-    if name.endswith(LOCKS):
+    if name.endswith(PASSING):
         return True
     if kind == "interrupted run" and name == "sumo.log":
         return True
@@ -100,6 +103,23 @@ class _Told:
     def started(self) -> None: ...
 
     def advanced(self, *_: Any) -> None: ...
+
+
+def _map_readers(folder: Folder) -> dict[str, Reader]:
+    from odscen.maps.store import Workspace
+
+    place, name = Workspace.open(folder.workspace), folder.path.name
+
+    def ask_doctor() -> None:
+        if place.stored(name).damaged():
+            raise InputError("damaged")
+
+    def read_all() -> None:
+        entry = place.map(name)
+        for key in entry.info["files"]:
+            entry.read(key)
+
+    return {"doctor": ask_doctor, "whoever opens it": read_all}
 
 
 def _run_readers(folder: Folder) -> dict[str, Reader]:
@@ -245,6 +265,7 @@ def _page(root: Path, *targets: str) -> dict[str, Reader]:
 
 
 FOLDERS: Mapping[str, Callable[[Folder], dict[str, Reader]]] = {
+    "map": _map_readers,
     "run": _run_readers,
     "interrupted run": _interrupted_readers,
     "study": _study_readers,
@@ -302,15 +323,20 @@ def changed_byte(folder: Path, name: str, place: int, bit: int, kept: Path) -> I
                     shutil.copy2(path, there)
 
 
-def places_of(size: int) -> list[int]:
-    """Each byte, or :data:`WHOLE` of them spread over the file, its first and last among them."""
-    if size <= WHOLE:
+def places_of(size: int, most: int = WHOLE) -> list[int]:
+    """Each byte, or so many of them spread over the file, its first and last among them."""
+    if size <= most:
         return list(range(size))
-    return sorted({round(n * (size - 1) / (WHOLE - 1)) for n in range(WHOLE)})
+    return sorted({round(n * (size - 1) / (most - 1)) for n in range(most)})
 
 
 def unnoticed(
-    folder: Folder, *, most: int | None = None, seed: int = 0, spread: int = OTHERS
+    folder: Folder,
+    *,
+    most: int | None = None,
+    seed: int = 0,
+    spread: int = OTHERS,
+    whole: int = WHOLE,
 ) -> Found:
     """Change bytes of a folder and ask its readers; ``most`` at random, or all that are due."""
     readers = folder.readers()
@@ -325,7 +351,7 @@ def unnoticed(
     else:
         first = next(iter(readers))
         for name in files:
-            places = places_of((folder.path / name).stat().st_size)
+            places = places_of((folder.path / name).stat().st_size, whole)
             some = set(places[:: max(1, len(places) // spread)]) | {places[-1]}
             due += [(name, at, list(readers) if at in some else [first]) for at in places]
     asked, found = 0, []
@@ -351,6 +377,7 @@ def main() -> None:
     options = argparse.ArgumentParser(prog="bench changed_bytes")
     options.add_argument("--most", type=int, help="bytes of each kind, at random")
     options.add_argument("--kinds", nargs="+", choices=list(FOLDERS), default=list(FOLDERS))
+    options.add_argument("--whole", type=int, default=WHOLE, help="most bytes of each file")
     options.add_argument("--seed", type=int, default=0)
     asked = options.parse_args()
     from bench.fuzz.limits import Limits
@@ -368,7 +395,7 @@ def main() -> None:
             files = folder.files()
             size = sum((folder.path / one).stat().st_size for one in files)
             begun = time.perf_counter()
-            found = unnoticed(folder, most=asked.most, seed=asked.seed)
+            found = unnoticed(folder, most=asked.most, seed=asked.seed, whole=asked.whole)
             took = time.perf_counter() - begun
             print(
                 f"| {kind} | {len(files)} | {size:,} | {found.changed:,} | {found.asked:,} "

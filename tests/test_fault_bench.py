@@ -16,7 +16,7 @@ from bench.fuzz.damage import changes_for, damaged
 from bench.fuzz.limits import Ended, Limits
 from bench.fuzz.map_damage import MAP
 from bench.fuzz.material import Material
-from bench.fuzz.results import wrong_in_document
+from bench.fuzz.results import wrong_in_document, wrong_in_variant
 from bench.fuzz.trials import Trial, trial_rng
 from bench.fuzz.verdicts import Verdict, judge, left_over, listing
 from odscen.base.errors import InputError
@@ -135,3 +135,20 @@ def test_what_a_document_says_is_held_against_what_was_read(tmp_path: Path, give
     file.write_text(given[:-1] + "," + json.dumps(data)[1:], encoding="utf-8")
     with pytest.raises(InputError, match="seed"):
         wrong_in_document(file)
+
+
+def test_a_variant_has_what_its_edits_say(tmp_path: Path) -> None:
+    source, out = tmp_path / "a.scenario.json", tmp_path / "b.scenario.json"
+    actors = [{"id": "car-1"}, {"id": "car-2"}]
+    source.write_text(json.dumps({"seed": 1, "actors": actors}))
+    edits = [{"kind": "set_seed", "seed": 4}, {"kind": "remove_actors", "actors": ["car-1"]}]
+    made = {"seed": 4, "actors": actors[1:], "variant": {"edits": edits}}
+    for change, words in (
+        ({}, ""),
+        ({"seed": 1}, "set_seed.seed: 4 became 1"),
+        ({"actors": []}, "['car-2'] were not removed, and are gone"),
+        ({"actors": actors}, "['car-1'] were removed, and are there"),
+        ({"variant": {"edits": edits[:1]}}, "2 edits were taken, and the variant names 1"),
+    ):
+        out.write_text(json.dumps(made | change))
+        assert wrong_in_variant(source, edits, out) == words

@@ -23,7 +23,7 @@ from bench.fuzz.damage import (
     torn,
 )
 from bench.fuzz.map_damage import XML
-from bench.fuzz.results import other_files, wrong_in_document
+from bench.fuzz.results import other_files, wrong_in_document, wrong_in_variant
 from bench.fuzz.trials import Target, Trial
 
 
@@ -246,45 +246,111 @@ def _few(said: str) -> bool:
 
 
 def edits_of_files(trial: Trial) -> str:
-    """``odscen variant`` with edits from a file or from words."""
+    """``odscen variant`` with edits from a file or from words; what is taken is in the variant."""
     rng = trial.rng
     used = trial.used("maps")
-    source = str(trial.material.file("turned.scenario.json"))
+    source = trial.material.file("turned.scenario.json")
     out = trial.folder / "variant" / "x.scenario.json"
     out.parent.mkdir()
-    call = ["variant", source, "--out", str(out)]
-    if rng.random() < 0.5:
-        damage = damaged(json.dumps(_EDITS).encode(), rng, {"value": json_value, **JSON})
-        file = trial.folder / "edits.json"
-        file.write_bytes(damage.data)
-        call.insert(2, str(file))
-        kind = damage.kind
+    call = ["variant", str(source)]
+    chosen = rng.permutation(len(_EDITS))[: int(rng.integers(1, 5))]
+    edits = [_EDITS[row] for row in sorted(chosen)]
+    file = trial.folder / "edits.json"
+    what = pick(
+        rng, ("as they are", "numbers", "numbers", "words", "value", "value", "bytes", "odd words")
+    )
+    if what == "numbers":
+        edits = [_with_other_numbers(edit, rng) for edit in edits]
+    kind = what
+    if what in ("words", "odd words"):
+        said = [
+            f"{edit['kind']}.{field}={json.dumps(value)}"
+            for edit in edits
+            for field, value in edit.items()
+            if field != "kind"
+        ]
+        if what == "odd words":
+            kind = _odd_setting(rng)
+            said.insert(int(rng.integers(len(said) + 1)), kind)
+        call += [f"--set={one}" for one in said]
     else:
-        from odscen.scenario.edits.edit_messages import EDIT_MESSAGES
-
-        edit = pick(rng, sorted(EDIT_MESSAGES))
-        field = pick(rng, (*sorted(EDIT_MESSAGES[edit].model_fields), *WORDS))
-        value = pick(rng, (*NUMBERS, *WORDS, "[]", "{}", "null", '["r1"]', '{"time": {}}'))
-        kind = f"{edit}.{field}={value}".replace("\x00", "")
-        kind = kind.encode("utf-8", errors="replace").decode()
-        call += [f"--set={kind}"]
-    ended = trial.command(*call, *used, writes=[out.parent])
-    if ended.code == 0:
-        trial.ask("variant", lambda: wrong_in_document(out))
-        trial.command("check", str(out), *used)
-        trial.command("diff", source, str(out), *used)
-        if rng.random() < 0.1:
-            trial.run(out, used)
+        data = json.dumps(edits).encode()
+        if what == "value":
+            for _ in range(int(pick(rng, (1, 1, 2)))):
+                data = json_value(data, rng)
+        elif what == "bytes":
+            damage = damaged(data, rng, JSON)
+            data, kind = damage.data, damage.kind
+        file.write_bytes(data)
+        call.insert(2, str(file))
+    ended = trial.command(*call, "--out", str(out), *used, writes=[out.parent])
+    if ended.code != 0:
+        if what in ("as they are", "numbers", "words"):
+            trial.wrong(f"edits that fit are refused: {[edit['kind'] for edit in edits]}")
+        return f"variant: {kind[:60]}"
+    trial.counts["edits taken"] += 1
+    trial.ask("variant", lambda: wrong_in_document(out))
+    if file.exists() or what == "words":
+        given = json.loads(file.read_bytes()) if file.exists() else edits
+        trial.ask("edits", lambda: wrong_in_variant(source, given, out))
+    trial.command("check", str(out), *used)
+    trial.command("diff", str(source), str(out))
+    if rng.random() < 0.2:
+        again = trial.folder / "again" / out.name
+        again.parent.mkdir()
+        trial.command(*call, "--out", str(again), *used)
+        trial.ask("variant again", lambda: other_files(out.parent, again.parent))
+    if rng.random() < 0.1:
+        trial.run(out, used)
     return f"variant: {kind[:60]}"
 
 
-_EDITS = [
+def _with_other_numbers(edit: dict[str, Any], rng: Generator) -> dict[str, Any]:
+    """Other numbers in the place of those of an edit, which fit as well."""
+    factor = float(pick(rng, (0.7, 0.9, 1.1, 1.5)))
+    found: dict[str, Any] = {}
+    for field, value in edit.items():
+        if isinstance(value, float):
+            found[field] = value if field == "max" else value * factor
+        elif isinstance(value, int):
+            found[field] = value + int(rng.integers(0, 3))
+        else:
+            found[field] = value
+    return found
+
+
+def _odd_setting(rng: Generator) -> str:
+    """A field of an edit of any kind, with an odd value."""
+    from odscen.scenario.edits.edit_messages import EDIT_MESSAGES
+
+    edit = pick(rng, sorted(EDIT_MESSAGES))
+    field = pick(rng, (*sorted(EDIT_MESSAGES[edit].model_fields), *WORDS))
+    value = pick(rng, (*NUMBERS, *WORDS, "[]", "{}", "null", '["r1"]', '{"time": {}}'))
+    said = f"{edit}.{field}={value}".replace("\x00", "")
+    return said.encode("utf-8", errors="replace").decode()
+
+
+_EDITS: tuple[dict[str, Any], ...] = (
     {"kind": "set_seed", "seed": 4},
     {"kind": "set_simulation", "duration": 20.0},
     {"kind": "set_environment", "preset": "HardRainNoon"},
-    {"kind": "remove_actors", "ids": ["car-1"]},
-    {"kind": "set_parameter", "name": "gap", "value": 12.0},
-]
+    {"kind": "set_parameter", "parameter": "gap", "value": 12.0, "max": 100.0},
+    {"kind": "set_goal", "actor": "car-2", "goal": None},
+    {"kind": "move_actor", "actor": "car-3", "spawn": "1.0.-2.29"},
+    {"kind": "rename", "name": "other", "description": "a variant"},
+    {"kind": "set_clock", "clock": 25200.0},
+    {"kind": "set_signal_control", "control": "actuated"},
+    {"kind": "add_actor", "id": "bike", "category": "bicycle", "spawn": "1.0.-1.11"},
+    {"kind": "add_flow", "id": "more", "spawn": "1.0.-2.5", "per_hour": 120.0},
+    {"kind": "change_flow", "flow": "f", "per_hour": 60.0},
+    {"kind": "set_zone", "zone": "west", "segments": ["r1", "r2"]},
+    {"kind": "set_study", "warm_up": 1},
+    {"kind": "set_drivers", "headway": 1.4},
+    {"kind": "set_routes", "by": "travel_time", "iterations": 2},
+    {"kind": "set_offset", "junction": "10001", "offset": 5.0},
+    {"kind": "remove_actors", "actors": ["car-1"]},
+)
+"""Each is taken, and so are any of them together."""
 
 HANDED_TARGETS: dict[str, tuple[Target, float]] = {
     "edits of files": (edits_of_files, 2.5),

@@ -111,6 +111,58 @@ def wrong_in_document(file: Path) -> str:
     return ""
 
 
+_PLACES: dict[str, tuple[str, ...]] = {
+    "set_seed": (),
+    "rename": (),
+    "set_simulation": ("simulation",),
+    "set_environment": ("environment",),
+    "set_study": ("study",),
+    "set_drivers": ("drivers",),
+    "set_clock": ("demand",),
+}
+"""Where a document has what edits of a kind give, by the same names."""
+
+
+def wrong_in_variant(source: Path, edits: Any, out: Path) -> str:
+    """What edits say that were taken, and the scenario made by them does not."""
+    document, before = strict_json(out), strict_json(source)
+    edits = edits if isinstance(edits, list) else [edits]
+    said = {(edit["kind"], field): given for edit in edits for field, given in edit.items()}
+    for (kind, field), given in said.items():
+        if kind in _PLACES and field != "kind" and given is not None:
+            read = document
+            for name in _PLACES[kind]:
+                read = read.get(name) or {}
+            if field not in read:
+                continue  # what is usual is not written
+            # An edit takes a number as text, too.
+            number = isinstance(given, str) and isinstance(read[field], int | float)
+            if words := _lost(float(given) if number else given, read[field], f"{kind}.{field}"):
+                return words
+    actors = {row["id"]: row for row in document.get("actors") or ()}
+    flows = {row["id"]: row for row in document.get("flows") or ()}
+    removed: set[str] = set()
+    for edit in edits:
+        if edit["kind"] == "remove_actors":
+            removed |= set(edit["actors"])
+        elif edit["kind"] == "add_flow" and edit.get("id"):
+            if edit["id"] not in removed | flows.keys():
+                return f"the flow {edit['id']!r} was added, and is not there"
+        elif edit["kind"] == "move_actor" and edit["actor"] in actors:
+            last = [one for one in edits if one.get("actor") == edit["actor"]][-1]
+            if last is edit and actors[edit["actor"]]["spawn"] != edit["spawn"]:
+                return f"{edit['actor']!r} was moved to {edit['spawn']!r}, and is not there"
+    missing = {row["id"] for row in before["actors"]} - removed - actors.keys()
+    if missing and not {edit["kind"] for edit in edits} & {"shrink_roi", "change_actor"}:
+        return f"{sorted(missing)} were not removed, and are gone"
+    if stayed := sorted(removed & actors.keys() - {edit.get("id") for edit in edits}):
+        return f"{stayed} were removed, and are there"
+    number = len((document.get("variant") or {}).get("edits") or ())
+    if number != len(edits):
+        return f"{len(edits)} edits were taken, and the variant names {number}"
+    return ""
+
+
 def _lost(given: Any, read: Any, place: str) -> str:
     """The first value that was given and is not what was read."""
     if isinstance(given, dict):

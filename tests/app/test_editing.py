@@ -161,6 +161,34 @@ def test_a_file_that_another_program_has_changed_is_a_step_of_its_own(
     assert again.undo() == empty
 
 
+def test_an_edit_cut_off_between_history_and_document_can_be_done_again(
+    workspace: Workspace, empty: Scenario
+) -> None:
+    """As a kill leaves it: the history has the step, or the one that was taken back."""
+    path = workspace.scenarios / f"cut-off{SUFFIX}"
+    editing = Editing(workspace, empty)
+    editing.apply("set_seed", seed=1)
+    editing.save(path)
+    before = path.read_bytes()
+    editing.apply("rename", name="other")
+    editing.save()
+    after = path.read_bytes()
+
+    path.write_bytes(before)
+    cut = Editing(workspace, path)
+    assert (cut.undo_label, cut.redo_label) == ("Change the seed", "Rename to other")
+    page = Drafts(workspace)
+    draft = page.get("cut-off")
+    assert (draft.history.undo, draft.history.redo) == ("Change the seed", "Rename to other")
+    page.redo("cut-off", draft.history.version)
+    assert path.read_bytes() == after
+
+    page.undo("cut-off", page.get("cut-off").history.version)
+    path.write_bytes(after)
+    cut = Editing(workspace, path)
+    assert (cut.undo_label, cut.redo_label) == ("Rename to other", None)
+
+
 @pytest.mark.slow
 def test_a_history_keeps_so_many_steps(tmp_path: Path) -> None:
     folder = HistoryFolder(tmp_path / "history")

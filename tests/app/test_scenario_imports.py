@@ -171,6 +171,31 @@ def test_broken_files_say_what_is_wrong(
         import_file(workspace, given(tmp_path, text))
 
 
+def test_a_refused_file_leaves_the_maps_as_they_were(tmp_path: Path) -> None:
+    workspace = Workspace.open(tmp_path / "workspace")
+    file = given(tmp_path, FILE.replace("ACTION", SPEED).replace("Storyboard>", "Board>"))
+    with pytest.raises(InputError, match="there is no Storyboard"):
+        import_file(workspace, file, on_map=str(tmp_path / "road.xodr"))
+    with pytest.raises(InputError, match="there is no Storyboard"):
+        import_file(workspace, file)
+    assert list(workspace.root.glob("maps/[!.]*")) == []
+    file = given(tmp_path, FILE.replace("ACTION", SPEED))
+    assert import_file(workspace, file).scenario is not None
+    assert workspace.map_names() == ["road"]
+
+
+def test_another_map_of_the_same_name_stays_what_it_is(tmp_path: Path) -> None:
+    workspace = Workspace.open(tmp_path / "workspace")
+    file = given(tmp_path, FILE.replace("ACTION", SPEED))
+    before = import_file(workspace, file).scenario
+    file.with_name("road.xodr").write_text(ROAD.replace('length="500"', 'length="600"'))
+    after = import_file(workspace, file).scenario
+    assert before is not None
+    assert after is not None
+    assert (before.map.name, after.map.name) == ("road", "road-2")
+    assert workspace.map("road").sha256 == before.map.sha256
+
+
 @pytest.mark.parametrize(
     ("named", "words"),
     [

@@ -62,10 +62,15 @@ def test_a_wrong_plan_is_refused_with_its_place(parts: dict[str, Any], words: st
         plan(**parts)
 
 
-def test_a_file_that_is_no_plan_is_named(tmp_path: Path) -> None:
-    file = tmp_path / "a.toml"
-    file.write_text("name = \n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"a\.toml: not a plan"):
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("a.toml", "name = \n"), ("a.json", r'{"scenarios": ["a.json"], "\ud800": 1}')],
+)
+def test_a_file_that_is_no_plan_is_named(tmp_path: Path, name: str, text: str) -> None:
+    """Half of a pair of surrogates is no character."""
+    file = tmp_path / name
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=rf"{name}: not a plan"):
         read_study_plan(file)
 
 

@@ -78,10 +78,26 @@ class HistoryFolder:
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
+    def continue_with(self, known: History | None, text: str) -> History:
+        """Continue the history that is known of a document; see :func:`open_history`.
+
+        A process that was killed has written the history and not the document, which is then one
+        step behind it, or before it if that was an undo.
+        """
+        if known is not None and known.sha256 != document_sha256(text):
+            for step in (-1, 1):
+                place = known.position + step
+                with suppress(InputError):
+                    if 0 <= place < len(known.entries) and (
+                        self.document(known.entries[place]) == text
+                    ):
+                        return known.move(step, text)
+        return open_history(known, text)
+
     def open(self, text: str) -> History:
         """Read the history of a document; see :func:`open_history`."""
         known = self.read()
-        opened = open_history(known, text)
+        opened = self.continue_with(known, text)
         if opened is not known:
             if known is None:
                 shutil.rmtree(self.folder, ignore_errors=True)
@@ -227,7 +243,11 @@ class Editing:
         else:
             self.scenario, text = scenario, dumps(scenario)
         known = self._folder.read() if self._folder is not None else None
-        self._history = open_history(known, text)
+        self._history = (
+            open_history(known, text)
+            if self._folder is None
+            else self._folder.continue_with(known, text)
+        )
         if self._history is not known:
             self._documents[self._history.current] = text
         self._kept = known or NO_HISTORY

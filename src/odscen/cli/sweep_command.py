@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -176,9 +175,11 @@ def _parameter_bounds(scenario: Scenario) -> tuple[Any, ...]:
 
 
 def _read_plan_file(file: Path) -> dict[str, Any]:
+    from pydantic_core import from_json
+
     text = read_given_text(file)
     try:
-        data = tomllib.loads(text) if file.suffix == ".toml" else json.loads(text)
+        data = tomllib.loads(text) if file.suffix == ".toml" else from_json(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"not a plan of a sweep: {error}") from error
     if not isinstance(data, dict):

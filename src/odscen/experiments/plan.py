@@ -10,7 +10,6 @@ The plan of a study is one JSON or TOML file:
 from __future__ import annotations
 
 import fnmatch
-import json
 import re
 import tomllib
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, model_validator
+from pydantic_core import from_json
 
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import ConflictError, InputError, in_file
@@ -197,7 +197,7 @@ def read_plan_data(file: Path) -> dict[str, Any]:
     text = read_given_text(file)
     with in_file(str(file)):
         try:
-            data = tomllib.loads(text) if file.suffix == ".toml" else json.loads(text)
+            data = tomllib.loads(text) if file.suffix == ".toml" else from_json(text)
         except (ValueError, RecursionError) as error:
             raise InputError(f"not a plan: {error}") from error
         if not isinstance(data, dict):

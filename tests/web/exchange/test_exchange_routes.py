@@ -223,6 +223,13 @@ def test_what_cannot_be_used_is_refused_with_its_name(known: TestClient) -> None
     assert known.get("/api/scenarios").json() == []
 
 
+def test_a_map_that_came_with_a_refused_file_is_not_kept(known: TestClient) -> None:
+    other = ROAD.replace('length="500"', 'length="510"')
+    assert other != ROAD
+    failure(known, ("a.xosc", CUT_IN.replace('s="48.6"', 's="far"')), ("road.xodr", other))
+    assert [row["name"] for row in known.get("/api/maps").json()] == ["road", CROSSING]
+
+
 def test_the_report_goes_where_the_scenario_goes(known: TestClient) -> None:
     name = report_of(known, ("a.xosc", CUT_IN))["scenario"]
     known.put(f"/api/scenarios/{name}/name", json={"name": "mine"})

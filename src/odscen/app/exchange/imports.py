@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import check_scenario, write_scenario
-from odscen.base.atomic_folders import scratch_folder
+from odscen.base.atomic_folders import discard, scratch_folder
 from odscen.base.checksums import digest
 from odscen.base.errors import InputError, NotFoundError
 from odscen.base.given_files import MOST, as_path, read_given
@@ -22,7 +23,8 @@ from odscen.base.text_files import write_text
 from odscen.formats import find_format, format_of_file
 from odscen.formats.base import ImportMap, ImportSource
 from odscen.maps.converters import GivenNetwork
-from odscen.maps.folder_names import name_from_file
+from odscen.maps.folder_names import check_name, name_from_file
+from odscen.maps.map_files import read_map_file
 from odscen.maps.netconvert import opendrive_of_network
 from odscen.opendrive.parse import parse
 
@@ -34,10 +36,12 @@ if TYPE_CHECKING:
     from odscen.base.given_files import GivenPath
     from odscen.formats.base import FileContent, GivenFile, ReportRow
     from odscen.maps.map_entry import MapEntry
-    from odscen.maps.store import Workspace
+    from odscen.maps.store import ProgressCallback, Workspace
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
+
+    AddedMaps = list[MapEntry]
 
 _FOLDERS_ABOVE: Final = 3
 """Folders above a file that may have the catalogs it names."""
@@ -86,9 +90,10 @@ def import_file(
     """Read a file of a foreign format: a scenario, or tracks of a recording.
 
     A map that it names is looked for beside it, in the folder ``maps``, and by its name in the
-    workspace; one that is found as a file is added to the workspace. Of a parameter value
-    distribution of OpenSCENARIO it is the scenario that it names, and the plan of the sweep is
-    written beside ``out``, with ``.sweep.json`` in the place of ``.scenario.json``.
+    workspace; one that is found as a file is added to the workspace, under a free name if its own
+    is taken, and removed again if the file is then refused. Of a parameter value distribution of
+    OpenSCENARIO it is the scenario that it names, and the plan of the sweep is written beside
+    ``out``, with ``.sweep.json`` in the place of ``.scenario.json``.
 
     Parameters
     ----------
@@ -130,35 +135,36 @@ def import_file(
     path = as_path(path)
     out = None if out is None else as_path(out)
     more_maps = None if maps is None else as_path(maps)
-    entry = None if on_map is None else _map_of_name_or_file(workspace, on_map)
+    with maps_for_import() as added:
+        entry = None if on_map is None else _map_of_name_or_file(workspace, on_map, added)
 
-    def find_map(named: str, file: GivenFile) -> MapEntry:
-        return entry or _map_beside(workspace, Path(file.where), more_maps, named)
+        def find_map(named: str, file: GivenFile) -> MapEntry:
+            return entry or _map_beside(workspace, Path(file.where), more_maps, named, added)
 
-    content = read_content(
-        workspace,
-        of or format_of_file(str(path)).id,
-        DiskFile(path),
-        name=name_from_file(path),
-        find_entry=find_map,
-        options=options,
-        map_given=on_map is not None or maps is not None,
-        bring=partial(map_of_network, workspace, on_map=entry),
-    )
-    plan_file = None
-    if out is not None and content.tracks is not None:
-        _write_tracks(content.tracks, out)
-    if content.scenario is None:
-        return ImportedFile(None, content.tracks, content.lists, ())
-    if out is not None:
-        write_scenario(content.scenario, out)
-        if content.plan is not None:
-            stem = out.name.removesuffix(".json").removesuffix(".scenario")
-            plan_file = write_text(out.with_name(f"{stem}.sweep.json"), plan_text(content.plan))
-    problems = check_scenario(workspace, content.scenario)
-    return ImportedFile(
-        content.scenario, content.tracks, content.lists, problems, content.plan, plan_file
-    )
+        content = read_content(
+            workspace,
+            of or format_of_file(str(path)).id,
+            DiskFile(path),
+            name=name_from_file(path),
+            find_entry=find_map,
+            options=options,
+            map_given=on_map is not None or maps is not None,
+            bring=partial(map_of_network, workspace, on_map=entry, added=added),
+        )
+        plan_file = None
+        if out is not None and content.tracks is not None:
+            _write_tracks(content.tracks, out)
+        if content.scenario is None:
+            return ImportedFile(None, content.tracks, content.lists, ())
+        problems = check_scenario(workspace, content.scenario)
+        if out is not None:
+            write_scenario(content.scenario, out)
+            if content.plan is not None:
+                stem = out.name.removesuffix(".json").removesuffix(".scenario")
+                plan_file = write_text(out.with_name(f"{stem}.sweep.json"), plan_text(content.plan))
+        return ImportedFile(
+            content.scenario, content.tracks, content.lists, problems, content.plan, plan_file
+        )
 
 
 def read_content(
@@ -220,8 +226,51 @@ def read_content(
     )
 
 
+@contextmanager
+def maps_for_import() -> Iterator[AddedMaps]:
+    """Yield a list for maps that are added for a file; they are removed if the block raises."""
+    added: AddedMaps = []
+    try:
+        yield added
+    except BaseException:
+        for entry in added:
+            discard(entry.folder)
+        raise
+
+
+def known_or_added(
+    workspace: Workspace,
+    content: bytes,
+    file: str,
+    added: AddedMaps,
+    progress: ProgressCallback | None = None,
+) -> MapEntry:
+    """The map of the workspace with the content of a file.
+
+    It is added if there is none, under a free name: scenarios may need what has its own.
+    """
+    sha256 = digest(content)
+    known = workspace.first_map(lambda entry: entry.sha256 == sha256)
+    if known is not None:
+        return known
+    name = _free_map_name(workspace, name_from_file(Path(file)))
+    added.append(workspace.add_map_content(content, file=file, name=name, progress=progress))
+    return added[-1]
+
+
+def _free_map_name(workspace: Workspace, wanted: str) -> str:
+    taken = set(workspace.map_names())
+    names = (wanted if n == 1 else f"{wanted[:56]}-{n}" for n in count(1))
+    return check_name(next(name for name in names if name not in taken))
+
+
 def map_of_network(
-    workspace: Workspace, named: str, content: bytes, *, on_map: MapEntry | None = None
+    workspace: Workspace,
+    named: str,
+    content: bytes,
+    *,
+    on_map: MapEntry | None = None,
+    added: AddedMaps | None = None,
 ) -> MapEntry:
     """The map that has a SUMO network, made of it if there is none.
 
@@ -236,6 +285,8 @@ def map_of_network(
         The ``.net.xml``.
     on_map
         The map whose network it is to be.
+    added
+        Hears of the map if it is a new one.
 
     Raises
     ------
@@ -261,12 +312,14 @@ def map_of_network(
         return known
     bare = re.sub(r"(\.net)?(\.xml)?(\.gz)?$", "", named.rpartition("/")[2], flags=re.IGNORECASE)
     bare = re.sub(r"[^A-Za-z0-9_.-]+", "-", bare).strip("-._")[:60] or "network"
-    taken = set(workspace.map_names())
-    name = next(free for n in count(1) if (free := bare if n == 1 else f"{bare}-{n}") not in taken)
+    name = _free_map_name(workspace, bare)
     xodr, _ = opendrive_of_network(content)
-    return workspace.add_map_content(
+    entry = workspace.add_map_content(
         xodr, file=f"{name}.xodr", name=name, network=GivenNetwork(content, printable(named))
     )
+    if added is not None:
+        added.append(entry)
+    return entry
 
 
 def plan_text(plan: SweepPlan) -> str:
@@ -325,13 +378,15 @@ class DiskFile:
                 yield DiskFile(path)
 
 
-def _map_of_name_or_file(workspace: Workspace, given: str) -> MapEntry:
+def _map_of_name_or_file(workspace: Workspace, given: str, added: AddedMaps) -> MapEntry:
     if given.lower().endswith(".xodr"):
-        return _known_or_added(workspace, Path(given))
+        return _known_or_added(workspace, Path(given), added)
     return workspace.map(given)
 
 
-def _map_beside(workspace: Workspace, file: Path, maps: Path | None, named: str) -> MapEntry:
+def _map_beside(
+    workspace: Workspace, file: Path, maps: Path | None, named: str, added: AddedMaps
+) -> MapEntry:
     """The map that a file names: one that is found as a file is added to the workspace.
 
     Raises
@@ -346,17 +401,15 @@ def _map_beside(workspace: Workspace, file: Path, maps: Path | None, named: str)
     places = [file.parent / _with_slashes(named)]
     for place in (*places, *(folder / f"{bare}.xodr" for folder in folders)):
         if place.is_file():
-            return _known_or_added(workspace, place)
+            return _known_or_added(workspace, place, added)
     if bare in workspace.map_names():
         return workspace.map(bare)
     raise NotFoundError("map", bare, workspace.map_names())
 
 
-def _known_or_added(workspace: Workspace, file: Path) -> MapEntry:
-    """The map of the workspace that has the content of a file; added if there is none."""
-    sha256 = digest(read_given(file))
-    known = workspace.first_map(lambda entry: entry.sha256 == sha256)
-    return workspace.add_map(file) if known is None else known
+def _known_or_added(workspace: Workspace, file: Path, added: AddedMaps) -> MapEntry:
+    content = read_map_file(file)
+    return known_or_added(workspace, content, file.name, added)
 
 
 def _with_slashes(path: str) -> str:

@@ -12,9 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from odscen.app.exchange.imports import bare_map_name, map_of_network, plan_text, read_content
+from odscen.app.exchange.imports import (
+    bare_map_name,
+    known_or_added,
+    map_of_network,
+    maps_for_import,
+    plan_text,
+    read_content,
+)
 from odscen.base.atomic_folders import scratch_folder
-from odscen.base.checksums import digest
 from odscen.base.errors import InputError, OdscenError
 from odscen.base.given_files import MOST, read_given
 from odscen.base.shown import printable
@@ -22,13 +28,14 @@ from odscen.formats import find_format
 from odscen.formats.base import VERDICTS
 from odscen.maps.allowances import for_import
 from odscen.maps.child_process import work_in_child
-from odscen.maps.folder_names import check_name, name_from_file
+from odscen.maps.folder_names import name_from_file
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps, loads
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from odscen.app.exchange.imports import AddedMaps
     from odscen.formats.base import Format, GivenFile
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import ProgressCallback
@@ -81,7 +88,8 @@ def read_sent_scenario(
 ) -> SentScenario:
     """Read a scenario of a foreign format, with its map and other files if they were sent.
 
-    A map that was sent and is not in the workspace is added, under a free name if its own is taken.
+    A map that was sent and is not in the workspace is added, under a free name if its own is taken,
+    and removed again if the scenario is then refused.
 
     Raises
     ------
@@ -131,22 +139,22 @@ def read_sent_scenario(
             )
 
         seen = read_in_child(None)
-        file, added = stories[seen["main"]].name, False
-        if seen.get("network") is not None:
-            before = workspace.map_names()
-            progress("making a map of the network", 0.1)
-            entry = map_of_network(workspace, seen["network"], (folder / _NETWORK).read_bytes())
-            added = entry.name not in before
-            read_in_child(entry.name)
-        elif seen["map"] is not None:
-            entry, added = _settle_map(workspace, named, seen["map"], file, progress)
-            read_in_child(entry.name)
+        file = stories[seen["main"]].name
+        with maps_for_import() as added:
+            if seen.get("network") is not None:
+                progress("making a map of the network", 0.1)
+                network = (folder / _NETWORK).read_bytes()
+                entry = map_of_network(workspace, seen["network"], network, added=added)
+                read_in_child(entry.name)
+            elif seen["map"] is not None:
+                entry = _settle_map(workspace, named, seen["map"], file, added, progress)
+                read_in_child(entry.name)
         plan = folder / _PLAN
         return SentScenario(
             loads((folder / _SCENARIO).read_text(encoding="utf-8"), file=file),
             file,
             name_from_file(Path(file)),
-            added,
+            bool(added),
             (folder / _REPORT).read_text(encoding="utf-8"),
             plan.read_text(encoding="utf-8") if plan.is_file() else None,
         )
@@ -157,24 +165,32 @@ def _settle_map(
     files: Sequence[SentFile],
     wanted: str,
     file: str,
+    added: AddedMaps,
     progress: ProgressCallback,
-) -> tuple[MapEntry, bool]:
+) -> MapEntry:
     """The map that a file names: the one that was sent with it, else that of the workspace."""
     bare = bare_map_name(wanted)
     maps = [file for file in files if _is_map(file.name)]
+
+    def add(sent_map: SentFile) -> MapEntry:
+        return known_or_added(
+            workspace, sent_map.content, sent_map.name, added,
+            lambda step, share: progress(step, 0.9 * share),
+        )  # fmt: skip
+
     if not bare:
         if len(maps) == 1:
-            return _known_or_added(workspace, maps[0], progress)
+            return add(maps[0])
         raise InputError(
             "it names no map (RoadNetwork/LogicFile): send one map together with it", file=file
         )
     for sent_map in maps:
         if bare_map_name(sent_map.name).lower() == bare.lower():
-            return _known_or_added(workspace, sent_map, progress)
+            return add(sent_map)
     names = workspace.map_names()
     for name in (bare, name_from_file(Path(f"{bare}.xodr"))):
         if name in names:
-            return workspace.map(name), False
+            return workspace.map(name)
     sent = ", ".join(sent_map.name for sent_map in maps)
     others = f" What was sent is {sent}." if sent else ""
     raise InputError(
@@ -182,28 +198,6 @@ def _settle_map(
         f"workspace.{others} Send that map together with the scenario, or add it first.",
         file=file,
     )
-
-
-def _known_or_added(
-    workspace: Workspace, sent: SentFile, progress: ProgressCallback
-) -> tuple[MapEntry, bool]:
-    """The map of this content; added if there is none."""
-    sha256 = digest(sent.content)
-    known = workspace.first_map(lambda entry: entry.sha256 == sha256)
-    if known is not None:
-        return known, False
-    stem = name_from_file(Path(sent.name))
-    name, number, taken = stem, 1, workspace.map_names()
-    while name in taken:
-        number += 1
-        name = f"{stem[:56]}-{number}"
-    entry = workspace.add_map_content(
-        sent.content,
-        file=f"{stem}.xodr",
-        name=check_name(name),
-        progress=lambda step, share: progress(step, 0.9 * share),
-    )
-    return entry, True
 
 
 def _is_map(name: str) -> bool:

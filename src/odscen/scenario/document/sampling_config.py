@@ -5,11 +5,11 @@ An empty file is a valid configuration. docs/sampling.md explains the fields wit
 
 from __future__ import annotations
 
-import json
 import tomllib
 from typing import Annotated, Any
 
 from pydantic import Field, ValidationError, field_validator
+from pydantic_core import from_json
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
@@ -210,7 +210,7 @@ def loads_config(text: str, *, file: str | None = None) -> SamplingConfig:
         With one line per problem, each with its place.
     """
     try:
-        data = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+        data = from_json(text) if text.lstrip().startswith("{") else tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise ScenarioError(
             f"the sampling configuration cannot be read: {error}", file=file
