@@ -1,9 +1,19 @@
 from __future__ import annotations
 
+import bz2
+import gzip
+
 import pytest
 
 from odscen.base.errors import InputError
-from odscen.maps.allowances import BY_SIZE, MOST_MEMORY, Allowance, BuildLimits, for_document
+from odscen.maps.allowances import (
+    BY_SIZE,
+    MOST_MEMORY,
+    Allowance,
+    BuildLimits,
+    for_document,
+    unpacked_size,
+)
 
 
 def test_a_larger_map_and_a_closer_spacing_may_use_more() -> None:
@@ -68,3 +78,11 @@ def test_less_memory_than_the_libraries_need_is_refused(monkeypatch: pytest.Monk
     monkeypatch.setenv("ODSCEN_BUILD_MEMORY", "0.1")
     with pytest.raises(InputError, match=r"ODSCEN_BUILD_MEMORY must be at least 0\.25"):
         BY_SIZE.for_map(1_000, spacing=2.0)
+
+
+def test_a_packed_extract_may_use_what_its_xml_may() -> None:
+    """A town of 0.6 MB of PBF was refused: it may use what 6 MB of XML may."""
+    xml = b"<osm version='0.6'/>"
+    assert unpacked_size(xml) == len(xml)
+    for packed in (gzip.compress(xml), bz2.compress(xml), b"\0\0\0\x0e\n\tOSMHeader" + xml):
+        assert unpacked_size(packed) == 10 * len(packed)

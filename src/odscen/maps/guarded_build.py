@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import in_file
-from odscen.maps.allowances import for_document
+from odscen.maps.allowances import for_document, unpacked_size
 from odscen.maps.child_process import work_in_child
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def build_in_child(
     OdscenError
         As :func:`~odscen.maps.map_build.build_map` does.
     """
-    size = len(content) + (len(given.net_xml) if given else 0)
+    size = unpacked_size(content) + (len(given.net_xml) if given else 0)
     allowance = limits.for_map(size, spacing=settings.spacing)
     with scratch_folder() as scratch:
         (folder / _XODR).write_bytes(content)

@@ -34,6 +34,8 @@ from odscen.maps.importers.osm.street_tags import (
 )
 from odscen.maps.importers.registry import importer_for
 from odscen.maps.store import Workspace
+from odscen.opendrive.lanes import RoadTable
+from odscen.opendrive.objects import object_outline
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import DRIVABLE_TYPES, OpenDrive
 
@@ -774,3 +776,96 @@ def test_all_that_acts_on_traffic_in_extracts_is_acted_on_or_listed(file: Path) 
         if x.type in DRIVABLE_TYPES
     ]
     assert drivable
+
+
+# ------------------------------------------------------------------ what stands beside, and heights
+
+
+def test_buildings_and_trees_stand_where_the_extract_has_them() -> None:
+    """Corners within a centimetre of the extract's, also where traffic keeps left."""
+    corners = [(20.0, 15.0), (50.0, 15.0), (50.0, 35.0), (30.0, 35.0), (30.0, 45.0), (20.0, 45.0)]
+    nodes = CROSS | {20 + k: place for k, place in enumerate(corners)} | {40: (-20.0, -20.0)}
+    nodes |= {60: (-10.0, -60.0), 61: (10.0, -60.0), 62: (10.0, -80.0), 63: (-10.0, -80.0)}
+    ring = [*range(20, 26), 20]
+    ways = {9 + k - 1: ([k, 1], {"highway": "tertiary"}) for k in (2, 3, 4, 5)}
+    ways[30] = (ring, {"building": "yes", "building:levels": "4", "name": "Hall"})
+    ways[31] = ([60, 61, 62, 63, 60], {"building": "yes"})
+    content = place_of(nodes, ways, node_tags={40: {"natural": "tree", "height": "12 m"}})
+    for side in ("right", "left"):
+        odr, entries = imported(content, driving_side=side)
+        table = RoadTable.of(odr)
+        objects = {o.type: (r, o) for r, road in odr.roads.items() for o in road.objects}
+        road, hall = objects["building"]
+        assert hall.name == "Hall"
+        assert hall.height == pytest.approx(12.8)
+        (outline,) = object_outline(table, road, hall)
+        # The extract's projection is at the middle of its streets, here the crossing.
+        away = [np.hypot(*(outline[:, :2] - corner).T).min() for corner in corners]
+        assert max(away) < 0.15
+        assert len(outline) == len(corners)
+        road, tree = objects["tree"]
+        (crown,) = object_outline(table, road, tree)
+        assert np.hypot(*(crown[:, :2].mean(axis=0) - (-20.0, -20.0))) < 0.1
+        assert tree.height == 12.0
+        # The one that the southern street runs through would stand on the road.
+        lost = [e for e in entries if e.source_id == "way 31"]
+        assert [e.outcome.value for e in lost] == ["lost"]
+
+
+def test_a_bridge_is_above_the_street_that_it_crosses_and_its_ramps_are_no_steps() -> None:
+    """6 m above it, 0 far from it, grades up to 8 %, and no step where roads meet."""
+    nodes = {1: (-400.0, 0.0), 2: (-30.0, 0.0), 3: (30.0, 0.0), 4: (400.0, 0.0)}
+    nodes |= {5: (0.0, -200.0), 6: (0.0, 200.0), 7: (-90.0, 0.0), 8: (-90.0, 120.0)}
+    ways = {
+        10: ([1, 7, 2], {"highway": "primary", "name": "high"}),
+        11: ([2, 3], {"highway": "primary", "bridge": "yes", "layer": "1", "name": "high"}),
+        12: ([3, 4], {"highway": "primary", "name": "high"}),
+        13: ([5, 6], {"highway": "secondary", "name": "low"}),
+        14: ([7, 8], {"highway": "residential", "name": "side"}),
+    }
+    odr, entries = imported(place_of(nodes, ways))
+    table = RoadTable.of(odr)
+    heights: dict[str, list[float]] = {"high": [], "low": [], "side": [], "": []}
+    ends = {}
+    for name, road in odr.roads.items():
+        s = np.linspace(0.0, road.length, 200)
+        line = table.reference(np.full(200, table.road_index[name]), s)
+        heights[road.name] += line.z.tolist()
+        # A turn is shorter than the way over the middle of the junction, so it is steeper.
+        assert np.abs(np.diff(line.z) / np.diff(s)).max() < (0.12 if road.junction else 0.08)
+        ends[name, "start"], ends[name, "end"] = line.z[0], line.z[-1]
+    assert max(heights["high"]) == pytest.approx(6.0, abs=0.01)
+    assert min(heights["high"]) == pytest.approx(0.0, abs=0.01)
+    assert max(map(abs, heights["low"])) == 0.0
+    assert 1.0 < max(heights["side"]) < 2.0
+    for name, road in odr.roads.items():
+        if road.junction:
+            for link, own in ((road.predecessor, "start"), (road.successor, "end")):
+                assert link is not None
+                other = ends[link.element_id, link.contact_point]  # type: ignore[index]
+                assert ends[name, own] == pytest.approx(other, abs=1e-6)
+    (guess,) = [e for e in entries if e.source_id == "way 11" and "bridge" in e.reason]
+    assert guess.reason == "bridge: 6 m above the ground, as it crosses OSM way 13"
+    assert guess.outcome.value == "guessed"
+
+
+def test_a_tunnel_is_below_the_street_above_it_and_a_bridge_over_water_stays_level() -> None:
+    nodes = {1: (-300.0, 0.0), 2: (-80.0, 0.0), 3: (80.0, 0.0), 4: (300.0, 0.0)}
+    nodes |= {5: (0.0, -200.0), 6: (0.0, -100.0), 7: (0.0, 200.0)}
+    ways = {
+        10: ([1, 2], {"highway": "primary", "name": "deep"}),
+        11: ([2, 3], {"highway": "primary", "tunnel": "yes", "layer": "-2", "name": "deep"}),
+        12: ([3, 4], {"highway": "primary", "name": "deep"}),
+        13: ([5, 6], {"highway": "secondary", "name": "above", "bridge": "yes"}),
+        14: ([6, 7], {"highway": "secondary", "name": "above"}),
+    }
+    odr, _ = imported(place_of(nodes, ways))
+    table = RoadTable.of(odr)
+    lowest = {"deep": 0.0, "above": 0.0}
+    for name, road in odr.roads.items():
+        if road.name:
+            s = np.linspace(0.0, road.length, 200)
+            line = table.reference(np.full(200, table.road_index[name]), s)
+            lowest[road.name] = min(lowest[road.name], float(line.z.min()))
+            assert line.z.max() < 0.01
+    assert lowest == {"deep": pytest.approx(-6.0, abs=0.01), "above": 0.0}

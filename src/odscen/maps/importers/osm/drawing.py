@@ -13,6 +13,7 @@ import numpy as np
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.maps.importers.osm import furniture as street_furniture
 from odscen.maps.importers.osm import junctions as places
+from odscen.maps.importers.osm import scenery
 from odscen.maps.importers.osm.junctions import Approach, Junction, Leg, Movement
 from odscen.maps.importers.osm.road_plan import (
     RoadPlan,
@@ -132,9 +133,16 @@ def draw_map(extract: Extract, network: StreetNetwork, *, name: str) -> DrawnMap
         _draw_junction(network, junction, plans, found, at_junctions, ranks, applied, drawn)
     _light_crossings(plans, found, at_junctions, drawn)
     _draw_midway_signals(plans, found, drawn)
+    heights = scenery.find_heights(network)
+    _raise_connecting_roads(plans, heights, drawn)
+    rows = scenery.draw_scenery(extract, network, plans, drawn.new_object)
+    for seen in [*heights.rows, *rows]:
+        outcome = ElementOutcome.GUESSED if seen.kept else ElementOutcome.LOST
+        drawn.note(outcome, seen.element, seen.reason, seen.confidence, seen.source)
     for plan in plans.values():
         street = network.streets[plan.street]
-        made = make_road(plan, kind=street_kind(network, street))
+        elevation = heights.elevation(plan)
+        made = make_road(plan, kind=street_kind(network, street), elevation=elevation)
         drawn.roads[made.id] = made
     drawn.roads = dict(sorted(drawn.roads.items(), key=lambda item: int(item[0])))
 
@@ -890,6 +898,25 @@ def _connecting_road(
         sections=(model.LaneSection(0.0, length, lanes),),
     )
     return road_id
+
+
+def _raise_connecting_roads(
+    plans: dict[int, RoadPlan], heights: scenery.StreetHeights, drawn: _Drawn
+) -> None:
+    """Give connecting roads the heights and grades of the roads that they connect."""
+    by_id = {model_id(plan.id): plan for plan in plans.values()}
+    for road in list(drawn.roads.values()):
+        if road.junction is None or road.predecessor is None or road.successor is None:
+            continue
+        ends = []
+        for link, same_way in ((road.predecessor, "end"), (road.successor, "start")):
+            plan = by_id[model_id(int(link.element_id))]
+            z, grade = heights.at_end(plan, at_end=link.contact_point == "end")
+            ends.append((z, grade if link.contact_point == same_way else -grade))
+        (z0, g0), (z1, g1) = ends
+        if max(abs(z0), abs(z1)) > scenery.LEVEL:
+            profile = scenery.hermite(0.0, road.length, np.array([z0, z1]), np.array([g0, g1]))
+            drawn.roads[road.id] = replace(road, elevation=(profile,))
 
 
 def _speed_at(plan: RoadPlan, *, at_end: bool, arriving: bool) -> float:

@@ -294,7 +294,7 @@ def lane_type(lane: StreetLane) -> str:
     return lane.kind
 
 
-def make_road(plan: RoadPlan, *, kind: str) -> model.Road:
+def make_road(plan: RoadPlan, *, kind: str, elevation: tuple[model.Cubic, ...] = ()) -> model.Road:
     """The road of a plan, in right-hand traffic."""
     sections = plan.sections
     widths: dict[tuple[int, int], list[model.Cubic]] = {}
@@ -388,7 +388,7 @@ def make_road(plan: RoadPlan, *, kind: str) -> model.Road:
         successor=_junction_link(plan.end_junction),
         types=types,
         geometry=write_geometry(plan.line.arcs),
-        elevation=(),
+        elevation=elevation,
         superelevation=(),
         lane_offset=tuple(_without_doubles(kept_offsets)),
         sections=tuple(made),
