@@ -146,7 +146,7 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
 
 
 def _parse_road_once_repeated(element: Element, notes: Notes) -> Road:
-    """Read a road; where that fails, read it without elements that stand twice in a row."""
+    """Read a road; where that fails, read it without elements that repeat the one before."""
     mark = notes.mark()
     try:
         return parse_road(element, notes)

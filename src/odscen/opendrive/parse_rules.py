@@ -40,7 +40,7 @@ class Rule(StrEnum):
     REPEATED_CONTROLLER = "repeated-controller"
     """Controllers of one id are one: it controls the signals of all of them."""
     REPEATED_ELEMENT = "repeated-element"
-    """An element that stands twice in a row, alike in everything, counts once."""
+    """An element that is in a file twice in a row, alike in everything, counts once."""
     ROAD_LEFT_OUT = "road-left-out"
     """A road that cannot be read is left out, if the others hang together without it."""
     POINT_ROAD = "point-road"
