@@ -48,6 +48,8 @@ def built(*signs: str) -> SumoNetwork:
         ("FR", "AB3a", "-1", "yield"),
         ("FR", "B1", "", "no_entry"),
         ("JP", "330-A", "-1", "stop"),
+        ("JP", "329", "2", "yield"),
+        ("JP", "330-2", "", "stop"),
         ("RU", "2.4", "-1", "yield"),
         ("RU", "2.5", "-1", "stop"),
         ("RU", "2", "5", "stop"),

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
+from lxml import etree
 
 from odscen.base.errors import OpenDriveError
 from odscen.base.ids import JunctionId, LaneKey, RoadId
@@ -26,7 +29,7 @@ def line(x: float, length: float, *, s: float = 0.0, y: float = 0.0) -> str:
     return f'<geometry s="{s!r}" x="{x!r}" y="{y!r}" hdg="0" length="{length!r}"><line/></geometry>'
 
 
-def chain(*lengths: float, more: str = "") -> list[str]:
+def chain(*lengths: float, more: str = "", inside: str = "") -> list[str]:
     """Roads 1, 2, ... one behind the other along the x axis, linked both ways."""
     roads, x = [], 0.0
     for number, length in enumerate(lengths, start=1):
@@ -34,7 +37,8 @@ def chain(*lengths: float, more: str = "") -> list[str]:
         if number < len(lengths):
             link += LINK.format("successor", number + 1, "start")
         plan = line(x, length)
-        roads.append(road(str(number), length=length, plan=plan, lanes=ALONG, link=link, more=more))
+        given = {"plan": plan, "lanes": ALONG, "link": link, "more": more, "inside": inside}
+        roads.append(road(str(number), length=length, **given))
         x += length
     return roads
 
@@ -360,3 +364,58 @@ def test_a_lane_that_names_another_follower_is_taken_at_its_word() -> None:
     )
     keys = lane_successors(odr)
     assert [one.lane for one in keys[LaneKey(RoadId("1"), 0, -1)]] == [-1]
+
+
+def doubled(text: str, tag: str, which: int = 0) -> str:
+    """The text with one element, the ``which``-th of its name, a second time behind it."""
+    root = etree.fromstring(text.encode())
+    element = list(root.iter(tag))[which]
+    element.addnext(copy.deepcopy(element))
+    return etree.tostring(root, encoding="unicode")
+
+
+@pytest.mark.parametrize(
+    ("tag", "which"),
+    [
+        ("road", 0),
+        ("road", 1),
+        ("link", 0),
+        ("link", 2),
+        ("planView", 0),
+        ("geometry", 0),
+        ("geometry", 1),
+        ("line", 0),
+        ("lanes", 0),
+        ("left", 0),
+        ("center", 1),
+        ("right", 0),
+        ("lane", 0),
+        ("lane", 2),
+        ("elevationProfile", 0),
+    ],
+)
+def test_an_element_that_stands_twice_in_a_row_counts_once(tag: str, which: int) -> None:
+    profile = '<elevationProfile><elevation s="0" a="1" b="0" c="0" d="0"/></elevationProfile>'
+    text = document(*chain(60.0, 40.0, inside=profile))
+    sound, read = parse(text), parse(doubled(text, tag, which))
+    assert set(rules(read)) <= {"repeated-element", "ignored"}
+    assert (read.roads, read.junctions) == (sound.roads, sound.junctions)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (lane(-1, inside=BOTH_LINKS.format(-1)), lane(-1, width=2.0)),
+        (lane(-1), lane(-1, kind="sidewalk")),
+        (lane(-1), lane(-1, inside=BOTH_LINKS.format(-1))),
+    ],
+)
+def test_lanes_of_one_id_that_differ_stay_refused(first: str, second: str) -> None:
+    with pytest.raises(OpenDriveError, match="there are two lanes with the id -1"):
+        parse(document(road(lanes=section(first, second))))
+
+
+def test_a_road_that_is_read_once_more_notes_what_it_tolerates_once() -> None:
+    slow = '<type s="0" type="town"><speed max="50" unit="KMH"/></type>'
+    text = document(road(inside=slow))
+    assert rules(parse(doubled(text, "lane"))) == ["repeated-element", "spelling"]

@@ -33,6 +33,7 @@ def crossing(
     name: str = "",
     speed: float = 30.0,
     kind: str = "town",
+    country: str = "DE",
 ) -> xodr.Junction:
     """Add a junction with every movement, and its furniture.
 
@@ -54,6 +55,8 @@ def crossing(
         Limit in km/h on the connecting roads.
     kind
         Road type of the connecting roads.
+    country
+        Whose signs it has: one of :data:`tools.make_maps.furniture.SIGNS`.
     """
     junction = builder.new_junction(ends, name)
     links: list[Link] = []
@@ -70,7 +73,7 @@ def crossing(
     if control == "lights":
         furniture.lights(builder, junction, ends, links, crosswalks=crosswalks)
     elif control != "none":
-        furniture.signs(builder, junction, ends, control, major, back=back)
+        furniture.signs(builder, junction, ends, control, major, back=back, country=country)
     return junction
 
 

@@ -7,16 +7,18 @@ from typing import TYPE_CHECKING
 
 from scenariogeneration import xodr
 
-from tools.make_maps.parts import SOLID, car_lanes, carriageway, inner_border, road_mark
+from tools.make_maps.parts import SOLID, End, car_lanes, carriageway, inner_border, road_mark
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from tools.make_maps.builder import Builder, Link
-    from tools.make_maps.parts import End, LaneSpec
+    from tools.make_maps.parts import LaneSpec
 
-CROSSWALK = (1.0, 4.0)
-"""Metres before the end of the road: where a crosswalk begins and ends."""
+CROSSWALK = 2.5
+"""Metres from the end of the road to the middle of a crosswalk."""
+CROSSWALK_LENGTH = 3.0
+"""Metres along the road."""
 STOP_LINE = 5.0
 """Metres before the end of the road."""
 STOP_LINE_ALONE = 1.0
@@ -28,23 +30,29 @@ SOLID_BEFORE = 25.0
 SIGN_BESIDE = 0.6
 """Metres from the carriageway's edge to the post of a sign or light."""
 
+SIGNS = {
+    "DE": {"stop": "206", "yield": "205", "priority": "306"},
+    "FR": {"stop": "AB4", "yield": "AB3a", "priority": "AB6"},
+    "SE": {"stop": "B2", "yield": "B1", "priority": "B4"},
+}
+"""Types of signs by country (docs/opendrive-coverage.md)."""
 
-def crosswalk(builder: Builder, end: End) -> None:
-    """Paint a crosswalk from sidewalk to sidewalk."""
-    near, far = CROSSWALK
+
+def crosswalk(builder: Builder, end: End, *, back: float = CROSSWALK) -> None:
+    """Paint a crosswalk from sidewalk to sidewalk; its middle is ``back`` metres before the end."""
     low = end.offset - carriageway(_side(end, -1)) - CROSSWALK_REACH
     high = end.offset + carriageway(_side(end, 1)) + CROSSWALK_REACH
     made = xodr.Object(
-        end.at((near + far) / 2),
+        end.at(back),
         (low + high) / 2,
         xodr.ObjectType.crosswalk,
         id=str(builder.new_id("object")),
         name="Crosswalk",
-        length=far - near,
+        length=CROSSWALK_LENGTH,
         width=high - low,
         height=0.0,
     )
-    u, v = (far - near) / 2, (high - low) / 2
+    u, v = CROSSWALK_LENGTH / 2, (high - low) / 2
     outline = xodr.Outline(closed=True)
     # CARLA expects the first corner once more at the end.
     for corner in ((-u, -v), (u, -v), (u, v), (-u, v), (-u, -v)):
@@ -83,8 +91,9 @@ def sign(
     back: float = STOP_LINE,
     lanes: Sequence[int] = (),
     dynamic: bool = False,
+    country: str = "DE",
 ) -> str:
-    """Put up a sign or light for the lanes that arrive; returns its id.
+    """Put up a sign, or with ``dynamic`` a light, for the lanes that arrive; returns its id.
 
     ``lanes`` are the positions of the lanes it is for, all lanes for cars if not given. A light for
     some of the inner lanes hangs above them, everything else stands on the right.
@@ -99,7 +108,7 @@ def sign(
     made = xodr.Signal(
         end.at(back),
         end.offset + side * aside,
-        "OpenDRIVE" if dynamic else "DE",
+        "OpenDRIVE" if dynamic else country,
         kind,
         "-1",
         id=number,
@@ -116,13 +125,16 @@ def sign(
     return number
 
 
-def walk_light(builder: Builder, end: End, sign_of_side: int) -> str:
-    """Put up a light for those who step off the sidewalk of one side; returns its id."""
+def walk_light(builder: Builder, end: End, sign_of_side: int, *, back: float = CROSSWALK) -> str:
+    """Put up a light for those who step off the sidewalk of one side; returns its id.
+
+    ``back`` is where the middle of the crosswalk is.
+    """
     lanes = _side(end, sign_of_side)
     lane = next(i for i, spec in enumerate(lanes) if spec.kind == "sidewalk")
     number = str(builder.new_id("signal"))
     made = xodr.Signal(
-        end.at(CROSSWALK[0]),
+        end.at(back - CROSSWALK_LENGTH / 2),
         end.offset + sign_of_side * (carriageway(lanes) + SIGN_BESIDE),
         "OpenDRIVE",
         "1000002",
@@ -224,6 +236,22 @@ def _refer(light: str, links: Iterable[Link]) -> None:
         reference.id = light  # the library insists on a new id when it is added
 
 
+def lights_between(builder: Builder, start: End, *, back: float) -> None:
+    """Put up lights at a crosswalk of a plain road, ``back`` metres before the end ``start``."""
+    other = End(start.record, "start" if start.at_end else "end")
+    places = ((start, back), (other, start.record.length - back))
+    before = STOP_LINE - CROSSWALK
+    crosswalk(builder, start, back=back)
+    cars = []
+    for end, middle in places:
+        stop_line(builder, end, back=middle + before)
+        cars.append(sign(builder, end, "1000001", "Light", back=middle + before, dynamic=True))
+    walkers = [walk_light(builder, start, side, back=back) for side in (-1, 1)]
+    for name, signals in (("vehicles", cars), ("pedestrians", walkers)):
+        number = builder.new_id("controller")
+        builder.controllers.append((number, f"road {start.record.id} {name}", signals))
+
+
 def signs(
     builder: Builder,
     junction: xodr.Junction,
@@ -232,17 +260,18 @@ def signs(
     major: Sequence[int],
     *,
     back: float,
+    country: str = "DE",
 ) -> None:
     """Put up stop or yield signs on the arms that wait, priority signs on the others."""
-    kind, name = {"stop": ("206", "Stop"), "yield": ("205", "Yield")}[control]
+    types = SIGNS[country]
     pairs = []
     for number, end in enumerate(ends):
         if not car_lanes(end.lanes(arriving=True)):
             continue
         if number in major:
-            sign(builder, end, "306", "Priority", back=back)
+            sign(builder, end, types["priority"], "Priority", back=back, country=country)
         else:
-            sign(builder, end, kind, name, back=back)
+            sign(builder, end, types[control], control.title(), back=back, country=country)
             pairs += [(ends[high].record.id, end.record.id) for high in major]
     builder.priorities[junction.id] = pairs
 

@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING
 
 from tools.make_maps.arterial_town import COUNT as ARTERIAL_COUNT
 from tools.make_maps.arterial_town import arterial_crossing, arterial_town
-from tools.make_maps.crossings import left_hand_crossing, signal_crossing, t_junction_signs
+from tools.make_maps.crossings import (
+    bus_street,
+    left_hand_crossing,
+    signal_crossing,
+    t_junction_signs,
+)
 from tools.make_maps.joined_towns import joined_towns
 from tools.make_maps.motorway import motorway_weave
 from tools.make_maps.roundabout import roundabout
@@ -28,6 +33,7 @@ MAPS: dict[str, Callable[[str], Builder]] = {
     "rural_hills": rural_hills,
     "town_5x5": town_5x5,
     "left_hand_crossing": left_hand_crossing,
+    "bus_street": bus_street,
 }
 ON_DEMAND: dict[str, Callable[[str], Builder]] = {
     "large_town": large_town,

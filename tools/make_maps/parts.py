@@ -6,6 +6,7 @@ left-hand map of a right-hand one.
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,7 +40,8 @@ SOLID = (Mark(0.0, "solid", "none"),)
 class LaneSpec:
     """A lane: type, width at its section's start (and end), marks on its outer border.
 
-    ``key`` ties lanes of successive sections of one road together.
+    ``key`` ties lanes of successive sections of one road together. ``only`` names the one vehicle
+    class of OpenDRIVE's access restrictions that may use the lane.
     """
 
     kind: str
@@ -47,6 +49,7 @@ class LaneSpec:
     marks: tuple[Mark, ...] = ()
     width_end: float | None = None
     key: str = ""
+    only: str = ""
 
 
 @dataclass(frozen=True)
@@ -211,9 +214,25 @@ def lane_section(
     return section
 
 
+class RestrictedLane(xodr.Lane):
+    """A lane with the ``<access>`` that the library lacks."""
+
+    only = ""
+
+    def get_element(self) -> ET.Element:
+        """Return the element, with access where the schema wants it: before heights."""
+        element: ET.Element = super().get_element()
+        if self.only:
+            heights = len(element.findall("height"))
+            access = ET.Element("access", sOffset="0", rule="allow", restriction=self.only)
+            element.insert(len(element) - heights, access)
+        return element
+
+
 def _lane(spec: LaneSpec, length: float) -> xodr.Lane:
     end = spec.width if spec.width_end is None else spec.width_end
-    lane = xodr.Lane(getattr(xodr.LaneType, spec.kind), *smooth(spec.width, end, length))
+    lane = RestrictedLane(getattr(xodr.LaneType, spec.kind), *smooth(spec.width, end, length))
+    lane.only = spec.only
     for mark in spec.marks:
         lane.add_roadmark(road_mark(mark))
     if spec.kind == "sidewalk":

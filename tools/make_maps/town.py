@@ -12,7 +12,7 @@ from scenariogeneration import xodr
 from tools.make_maps import roundabout
 from tools.make_maps.builder import Builder
 from tools.make_maps.crossing import crossing
-from tools.make_maps.crossings import EAST, NORTH, SOUTH, WEST
+from tools.make_maps.crossings import EAST, NORTH, SOUTH, WEST, WIDE_REACH
 from tools.make_maps.geometry import Pose
 from tools.make_maps.parts import End, street
 
@@ -28,8 +28,6 @@ PITCHES = (105.0, 90.0, 125.0, 95.0, 115.0)
 """Metres between neighbouring streets, over and over."""
 REACH = 14.0
 """Metres from the middle of a junction to the end of its arms."""
-WIDE_REACH = 18.0
-"""The same along the avenue, which has two lanes each way."""
 BEND_RADIUS = 30.0
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from contextlib import nullcontext
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from odscen.base.errors import OpenDriveError, in_file
@@ -43,6 +44,8 @@ IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"
 NO_HEADER: Final = Header(1, 4, "", None, None, None, None, "", None)
 """What stands for a missing ``<header>``: the oldest version, no bounds, no projection."""
 _CRS_TEXT: Final = re.compile(r"proj=|init=|EPSG:|ESRI:|CRS\[|CS\[", re.IGNORECASE)
+_LISTS: Final = frozenset({"objects", "object", "outlines", "outline", "signals"})
+"""Elements whose children may be alike, or have rules of their own for that."""
 K = TypeVar("K")
 V = TypeVar("V")
 
@@ -115,18 +118,18 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
     faults: list[RoadFault] = []
     for element in elements:
         try:
-            road = parse_road(element, notes)
+            road = _parse_road_once_repeated(element, notes)
         except OpenDriveError as error:
             faults.append(RoadFault(element.get("id", ""), error))
         else:
-            _add_unique(roads, road.id, road, element)
+            _add_unique(roads, road.id, road, element, notes)
     twice = next((fault for fault in faults if fault.road in roads), None)
     if twice is not None:
         raise twice.error
     junctions: dict[JunctionId, Junction] = {}
     for element in groups.get("junction", ()):
         junction = parse_junction(element, roads, notes)
-        _add_unique(junctions, junction.id, junction, element)
+        _add_unique(junctions, junction.id, junction, element, notes)
     controllers: dict[str, Controller] = {}
     for element in groups.get("controller", ()):
         _add_controller(controllers, element, notes)
@@ -142,7 +145,47 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
     return replace(odr, notes=notes.sentences())
 
 
-def _add_unique(known: dict[K, V], key: K, value: V, element: Element) -> None:
+def _parse_road_once_repeated(element: Element, notes: Notes) -> Road:
+    """Read a road; where that fails, read it without elements that repeat the one before."""
+    mark = notes.mark()
+    try:
+        return parse_road(element, notes)
+    except OpenDriveError:
+        repeated = [
+            after
+            for parent in element.iter()
+            if parent.tag not in _LISTS
+            for before, after in pairwise(parent)
+            if _are_alike(before, after)
+        ]
+        if not repeated:
+            raise
+        notes.return_to(mark)
+        for twin in repeated:
+            notes.add(Rule.REPEATED_ELEMENT, twin, "it is like the one before it, and counts once")
+        for twin in repeated:
+            parent = twin.getparent()
+            if parent is not None:
+                parent.remove(twin)
+        return parse_road(element, notes)
+
+
+def _are_alike(one: Element, other: Element) -> bool:
+    """Whether two elements say the same, with all that is in them."""
+    return (
+        one.tag == other.tag
+        and one.attrib == other.attrib
+        and (one.text or "").strip() == (other.text or "").strip()
+        and len(one) == len(other)
+        and all(map(_are_alike, one, other))
+    )
+
+
+def _add_unique(known: dict[K, V], key: K, value: V, element: Element, notes: Notes) -> None:
+    if key in known and known[key] == value:
+        detail = "another one of that id is like it in everything, and both are one"
+        notes.add(Rule.REPEATED_ELEMENT, element, detail)
+        return
     if key in known:
         tag = str(element.tag)
         problem = f"there is another {tag} with the id {shown(str(key))}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from enum import StrEnum
-from typing import Final
+from typing import Final, TypeAlias
 
 from odscen.opendrive.parse_xml import Element, element_path
 
@@ -39,6 +39,8 @@ class Rule(StrEnum):
     """Objects and signals may share an id; references mean the first."""
     REPEATED_CONTROLLER = "repeated-controller"
     """Controllers of one id are one: it controls the signals of all of them."""
+    REPEATED_ELEMENT = "repeated-element"
+    """An element that is in a file twice in a row, alike in everything, counts once."""
     ROAD_LEFT_OUT = "road-left-out"
     """A road that cannot be read is left out, if the others hang together without it."""
     POINT_ROAD = "point-road"
@@ -170,6 +172,9 @@ MAX_NEGATIVE_WIDTH: Final = 0.25
 _LISTED_PER_RULE = 1000
 
 
+NotesMark: TypeAlias = tuple[int, Counter[Rule], Counter[tuple[Rule, str, str]]]
+
+
 class Notes:
     """Collects one sentence per use of a tolerance; beyond a thousand of a rule only counts."""
 
@@ -188,6 +193,15 @@ class Notes:
     def skip(self, rule: Rule, parent: str, tag: str, count: int = 1) -> None:
         """Count elements ``tag`` below ``parent`` that are not read; one note per kind."""
         self._skipped[rule, parent[:60], tag[:60]] += count
+
+    def mark(self) -> NotesMark:
+        """Where the notes stand, for :meth:`return_to`."""
+        return len(self._sentences), self._uses.copy(), self._skipped.copy()
+
+    def return_to(self, mark: NotesMark) -> None:
+        """Forget what was noted since ``mark``."""
+        count, self._uses, self._skipped = mark
+        del self._sentences[count:]
 
     def sentences(self) -> tuple[str, ...]:
         """All notes, those of single elements first."""

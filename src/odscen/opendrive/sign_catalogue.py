@@ -106,10 +106,12 @@ _SE: Final[dict[str, SignMeaning]] = {
     "d10": "bus_lane",
 }
 
-# Order on Road Signs, Road Lines and Road Surface Markings (1960), tables 1 and 2. Japan has no
-# sign to give way but that to stop.
+# Order on Road Signs, Road Lines and Road Surface Markings (1960), tables 1 and 2. The road ahead
+# has priority (329 no 2, 330 no 2 with a stop): Road Traffic Act, article 36.
 _JP: Final[dict[str, SignMeaning]] = {
+    "329-2": "yield",
     "330": "stop",
+    "330-2": "stop",
     "330-a": "stop",
     "330-b": "stop",
     "303": "no_entry",

@@ -83,4 +83,4 @@ def test_the_program_of_every_light_of_the_shipped_maps_can_be_taken_over(
         for light in map_of(store, one).lights:
             take_over_program(store, one, light.names[0])
             taken += 1
-    assert taken == 8
+    assert taken == 10

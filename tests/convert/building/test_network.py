@@ -13,6 +13,7 @@ import sumo
 from odscen.base.ids import LaneKey, RoadId
 from odscen.convert.building.network import build_network
 from odscen.convert.lane_table.table_json import table_from_json, table_to_json
+from odscen.convert.model.access import allowed
 from odscen.convert.model.conversion_report import ElementOutcome
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
@@ -204,3 +205,29 @@ def test_a_faulty_junction_table_makes_the_network_of_the_sound_one() -> None:
     assert {e.outcome for e in repaired} == {ElementOutcome.REPAIRED}
     assert len(repaired) == 8
     assert network.report.figures["connections_lost"] == 0
+
+
+def test_the_street_of_buses_has_what_it_ships_for() -> None:
+    """Lanes for buses by access, a short link, lights amid a road, signs of three countries."""
+    made = converted(named("bus_street"))
+    lanes = made.network.table.lanes
+    buses = {
+        lane
+        for lane, own in lanes.items()
+        if own.allowed == allowed("bus") and not lane.startswith(":")
+    }
+    # Road 5 is cut where its lights are.
+    sections = ["1.1", "5.1", "5.2", "7.1", "9.1"]
+    assert buses == {f"{section}.{way}_0" for section in sections for way in "fb"}
+    short = [lane for lane in lanes if lane.startswith("3.0.")]
+    assert len(short) == 4
+    assert len(made.xml.findall("tlLogic")) == 2
+    assert len(made.xml.findall("edge[@function='crossing']")) == 13
+    countries = {signal.country for road in made.odr.roads.values() for signal in road.signals}
+    assert countries == {"OpenDRIVE", "DE", "FR", "SE"}
+    waits = {
+        link.get("from"): link.get("state")
+        for link in made.xml.iter("connection")
+        if link.get("from") in {"4.1.f", "6.1.f", "8.1.f"}
+    }
+    assert waits == {"4.1.f": "m", "6.1.f": "s", "8.1.f": "m"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from functools import cache
 
 import numpy as np
@@ -108,3 +109,21 @@ def test_a_network_of_another_map_is_refused_with_the_lengths() -> None:
     made, other = converted(named("motorway_weave")), converted(named("signal_crossing"))
     with pytest.raises(InputError, match=r"not one of this map: \d+ of \d+ m of its lanes"):
         imported_network(other.network.net_xml, made.odr, made.roads, made.graph.walks)
+
+
+@pytest.mark.parametrize(
+    ("access", "taken"),
+    [('allow="tram"', True), ('allow="rail"', True), ('allow="bus"', False), ("", False)],
+)
+def test_tracks_beside_the_roads_of_a_map_do_not_make_a_network_a_strangers(
+    access: str, taken: bool
+) -> None:
+    made = converted(named("t_junction_signs"))
+    node = next(e.get("id") for e in made.xml.iter("junction") if e.get("type") == "dead_end")
+    track = (
+        f'<edge id="track" from="{node}" to="{node}" priority="1"><lane id="track_0" index="0" '
+        f'{access} speed="20" length="9000" shape="0,900 9000,900"/></edge>'
+    )
+    net = made.network.net_xml.replace(b"<junction", track.encode() + b"<junction", 1)
+    with nullcontext() if taken else pytest.raises(InputError, match="not one of this map"):
+        imported_network(net, made.odr, made.roads, made.graph.walks)

@@ -9,7 +9,7 @@ from odscen.convert.imported.geometric_table import geometric_table
 from odscen.convert.imported.net_import import read_network
 from odscen.convert.lane_table.coverage import covered_metres, kept_lanes, lane_lengths
 from odscen.convert.lane_table.sumo_network import SumoNetwork
-from odscen.convert.model.access import is_used
+from odscen.convert.model.access import PEDESTRIAN, allowed, is_used
 from odscen.convert.model.conversion_report import (
     ConversionReport,
     ElementOutcome,
@@ -162,6 +162,9 @@ LEAST_COVERED = 0.05
 LEAST_PLACED = 0.5
 """Share of the network's lanes outside junctions that must lie on lanes of the map."""
 
+ROAD_USERS = allowed("driving") | PEDESTRIAN
+"""Classes whose lanes a map can have; tracks are none (:data:`LEAST_PLACED`)."""
+
 
 def imported_network(
     net_xml: bytes,
@@ -216,7 +219,8 @@ def _refuse_stranger(figures: Mapping[str, float], lanes: LaneTable) -> None:
     own = {
         row: lane.length
         for row, lane in enumerate(lanes.lane_list)
-        if lanes.edges[lane.edge].function == NORMAL and lane.allowed != frozenset()
+        if lanes.edges[lane.edge].function == NORMAL
+        and (lane.allowed is None or lane.allowed & ROAD_USERS)
     }
     placed = sum(
         float(interval.pos[-1] - interval.pos[0])
