@@ -116,9 +116,8 @@ def speeds_of_positions(
     if len(time) < 2:
         return speed
     order = np.argsort(row, kind="stable")
-    time, row, x, y, angle, old, walking = (
-        part[order] for part in (time, row, x, y, angle_deg, speed, walking)
-    )
+    time, x, y, angle, old = (part[order] for part in (time, x, y, angle_deg, speed))
+    row, walking = row[order], walking[order]
     passed = np.diff(time)
     same = (row[1:] == row[:-1]) & (passed > 1e-6)
     if not same.any():
