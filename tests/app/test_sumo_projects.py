@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import os
+import re
+import shutil
 import subprocess
 from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 
+import polars as pl
 import pytest
 import sumo
 from lxml import etree
@@ -20,6 +25,7 @@ from odscen.base.errors import InputError, OdscenError
 from odscen.base.xml_reading import read_xml
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
+from odscen.runs.recorded import read_lanes, read_light_states
 from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.measures_document import RoadClosure
@@ -150,30 +156,100 @@ def test_the_document_has_times_seed_and_parts(scenario: Scenario) -> None:
     assert loads(dumps(scenario)) == scenario
 
 
-def trips_of(file: Path) -> dict[str, tuple[float, float]]:
-    return {
+class Original(NamedTuple):
+    """What ``sumo -c`` alone does.
+
+    Attributes
+    ----------
+    trips
+        Departure and duration, s, of those who have arrived.
+    flows
+        Vehicles by edge and hour.
+    lights
+        States of each light by second; each from one change to the next.
+    """
+
+    trips: dict[str, tuple[float, float]]
+    flows: dict[tuple[str, int], float]
+    lights: dict[str, list[tuple[float, str]]]
+
+
+def run_of_sumo(folder: Path, config: str, *additional: str, net: str) -> Original:
+    """Run a project by SUMO alone, with flows and lights written."""
+    lights = {logic.get("id") for logic in etree.parse(folder / net).iter("tlLogic")}
+    events = "".join(
+        f'<timedEvent type="SaveTLSStates" source="{light}" dest="tls.xml"/>'
+        for light in sorted(map(str, lights))
+    )
+    (folder / "measured.add.xml").write_text(
+        f'<additional><edgeData id="e" period="3600" file="edges.xml"/>{events}</additional>'
+    )
+    subprocess.run(
+        [
+            BIN / "sumo", "-c", config, "-a", ",".join((*additional, "measured.add.xml")),
+            "--tripinfo-output", "trips.xml", "--precision", "4",
+        ],
+        cwd=folder, check=True, capture_output=True,
+    )  # fmt: skip
+    trips = {
         str(t.get("id")): (float(t.get("depart", "")), float(t.get("duration", "")))
-        for t in etree.parse(file).iter("tripinfo")
+        for t in etree.parse(folder / "trips.xml").iter("tripinfo")
         if float(t.get("arrival", "-1")) >= 0
     }
+    flows = Counter[tuple[str, int]]()
+    for edge in etree.parse(folder / "edges.xml").iter("edge"):
+        interval = edge.getparent()
+        assert interval is not None
+        hour = int(float(interval.get("begin", "")) // 3600)
+        number = int(edge.get("entered", "0")) + int(edge.get("departed", "0"))
+        flows[str(edge.get("id")), hour] += number
+    shown: dict[str, list[tuple[float, str]]] = {}
+    for row in etree.parse(folder / "tls.xml").iter("tlsState"):
+        own = shown.setdefault(str(row.get("id")), [])
+        if not own or own[-1][1] != row.get("state"):
+            own.append((float(row.get("time", "")), str(row.get("state"))))
+    return Original(trips, {key: n for key, n in flows.items() if n}, shown)
+
+
+def assert_agrees(done: Run, original: Original) -> None:
+    """Flows by edge and hour, mean travel time, and lights by second."""
+    lanes = read_lanes(done.folder)
+    assert lanes is not None
+    hours = lanes.group_by("edge", hour=(pl.col("begin") // 3600).cast(pl.Int64)).agg(
+        (pl.col("entered") + pl.col("departed")).sum().alias("vehicles")
+    )
+    mine = {(edge, hour): n for edge, hour, n in hours.rows() if n and not edge.startswith(":")}
+    geh = [
+        math.sqrt(2 * (mine.get(key, 0) - n) ** 2 / (mine.get(key, 0) + n))
+        for key, n in original.flows.items()
+    ]
+    assert sum(value < 5 for value in geh) >= 0.95 * len(geh)
+    assert not mine.keys() - original.flows.keys()
+    arrived = done.events().filter(
+        pl.col("kind") == "arrived", pl.col("actor").is_in(list(original.trips))
+    )
+    assert len(arrived) == pytest.approx(len(original.trips), rel=0.01)
+    mean = sum(seconds for _, seconds in original.trips.values()) / len(original.trips)
+    assert arrived["travel_time"].mean() == pytest.approx(mean, rel=0.05)
+    states = read_light_states(done.folder)
+    assert states is not None
+    end = states["time"].max()  # odscen ends a run when nobody is left, SUMO goes on
+    for light, rows in original.lights.items():
+        own = states.filter(pl.col("light") == light).select("time", "state").rows()
+        changes = [row for n, row in enumerate(own) if not n or own[n - 1][1] != row[1]]
+        assert changes[1:] == [row for row in rows[1:] if row[0] <= end], light
+        assert len(changes) > 5
 
 
 @pytest.fixture(scope="module")
-def original(project: Path) -> dict[str, tuple[float, float]]:
+def original(project: Path) -> Original:
     text = CONFIG.replace("missing.xml", "").replace("/tmp/summary.xml", "summary.xml")
     text = text.replace('<gui_only><gui-settings-file value=""/></gui_only>', "")
     (project / "plain.sumocfg").write_text(text)
     things = (project / "things.add.xml").read_text().replace("../../", "")
     start, _, rest = things.partition('<tlLogic id="nowhere"')
     (project / "plain.add.xml").write_text(start + rest.partition("</tlLogic>")[2])
-    subprocess.run(
-        [
-            BIN / "sumo", "-c", "plain.sumocfg", "-a", "plain.add.xml", "--tripinfo-output",
-            "trips.xml", "--precision", "4",
-        ],
-        cwd=project, check=True, capture_output=True,
-    )  # fmt: skip
-    return trips_of(project / "trips.xml")
+    return run_of_sumo(project, "plain.sumocfg", "plain.add.xml", net="grid.net.xml")
 
 
 @pytest.fixture(scope="module")
@@ -181,22 +257,33 @@ def finished(store: Workspace, scenario: Scenario) -> Run:
     return run(store, scenario)
 
 
-def test_the_run_is_that_of_sumo_alone(
-    finished: Run, original: dict[str, tuple[float, float]]
-) -> None:
+def test_the_run_is_that_of_sumo_alone(finished: Run, original: Original) -> None:
+    assert_agrees(finished, original)
     rows = {row["id"]: row for row in finished.actors().to_dicts()}
-    arrived = {
-        event["actor"]: event["travel_time"]
-        for event in finished.events().to_dicts()
-        if event["kind"] == "arrived"
-        and rows.get(event["actor"], {}).get("category") != "pedestrian"
-    }
-    assert arrived.keys() == original.keys()
-    mine = sum(arrived.values()) / len(arrived)
-    assert mine == pytest.approx(sum(t for _, t in original.values()) / len(original), rel=0.05)
     assert (rows["v1"]["category"], rows["v1"]["status"]) == ("truck", "arrived")
     assert Counter(row["flow"] for row in rows.values())["f"] == 100
     assert {"p1", "p2", "bus", "t1"} <= rows.keys()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not PROJECTS.is_dir(), reason="projects of others are not here")
+def test_acosta_runs_as_sumo_alone_with_all_its_seven_programs(
+    store: Workspace, tmp_path: Path
+) -> None:
+    folder = tmp_path / "acosta"
+    shutil.copytree(PROJECTS / "acosta", folder)
+    config = (folder / "run.sumocfg").read_text()
+    start, _, rest = config.partition("<gui_only>")
+    (folder / "plain.sumocfg").write_text(start + rest.partition("</gui_only>")[2])
+    named = re.search(r'additional-files value="(.*?)"', config)
+    assert named
+    original = run_of_sumo(
+        folder, "plain.sumocfg", *named[1].split(","), net="acosta_buslanes.net.xml"
+    )
+    made = import_file(store, folder / "run.sumocfg")
+    assert made.scenario is not None
+    assert len(original.lights) == 7
+    assert_agrees(run(store, made.scenario), original)
 
 
 def test_nothing_is_written_outside_the_run(finished: Run) -> None:

@@ -61,6 +61,23 @@ def test_tables_are_read_in_and_taken_back(client: TestClient, state: dict[str, 
     assert undone["document"] == trips["document"]
 
 
+def test_files_of_other_programs_are_named_and_read_in(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    matrix = "$V;D2\n7.00 8.00\n1\n2\nr1 r2\n0 30\n20 0\n"
+    refused = send(client, state["version"], "od", matrix)
+    assert refused.status_code == 422
+    assert "this seems to be a VISUM matrix in format V with 2 zones" in refused.text
+    assert "File of another program" in refused.text
+    answer = send(client, state["version"], "office", matrix).json()
+    assert answer["undo"] == "Import of a VISUM matrix in format V with 2 zones"
+    (found,) = answer["document"]["demand"]["matrices"]
+    assert found["trips"] == [["r1", "r2", 30], ["r2", "r1", 20]]
+    wrong = send(client, answer["version"], "office", "$V;D2\n7.00 8.00\n1\n2\nr1 r2\n0 x\n")
+    assert wrong.status_code == 422
+    assert "line 6: 'x' is no number" in wrong.text
+
+
 @pytest.mark.parametrize(
     ("kind", "text", "told"),
     [

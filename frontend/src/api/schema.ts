@@ -245,6 +245,9 @@ export interface paths {
         /**
          * Table
          * @description Read a table into a scenario, all of it or nothing; see ``docs/demand.md``.
+         *
+         *     Of the kind ``office`` is whatever :func:`odscen.formats.office.read_traffic.read_traffic`
+         *     reads; see ``docs/office-files.md``.
          */
         post: operations["table_api_scenarios__name__demand_table_post"];
     };
@@ -1055,7 +1058,7 @@ export interface components {
             file: string;
             version: number;
             /** @enum {string} */
-            kind: "od" | "inputs" | "counts" | "profile" | "zones";
+            kind: "od" | "inputs" | "counts" | "profile" | "zones" | "office";
             /** @description Name of what is read in. */
             part?: string | null;
             /** @description Day profile of trips. */

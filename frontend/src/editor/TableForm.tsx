@@ -35,6 +35,11 @@ const KINDS = localized((): Record<TableKind, { label: string; stem: string | nu
     stem: "my-day",
     text: t`The share of the traffic in each equal slice of a day, from midnight.`,
   },
+  office: {
+    label: t`File of another program`,
+    stem: null,
+    text: t`Matrices of VISUM and SUMO, edgeData, turn ratios, detectors and their output, tables with any titles, also of Excel: it is found out what the file is.`,
+  },
   zones: { label: t`Zones`, stem: null, text: t`Names for groups of segments, for use in tables of trips.` },
 }));
 
@@ -79,7 +84,8 @@ export function TableForm({
     setRefusal(null);
     take((version) => demand.table(name, version, kind, file, chosen.stem && part.trim()))
       .then(
-        () => tell(t`${file.name} is imported.`),
+        ({ label }) =>
+          tell(kind === "office" ? `${file.name}: ${served(label)}` : t`${file.name} is imported.`),
         (error: unknown) => setRefusal({ file: file.name, problems: problemsOf(error) }),
       )
       .finally(() => setBusy(false));
@@ -143,7 +149,11 @@ export function TableForm({
         </Alert>
       )}
       <Group>
-        <FileButton accept=".csv,.tsv,.txt,text/csv" resetRef={reset} onChange={send}>
+        <FileButton
+          accept={kind === "office" ? undefined : ".csv,.tsv,.txt,text/csv"}
+          resetRef={reset}
+          onChange={send}
+        >
           {(props) => (
             <Button variant="light" loading={busy} disabled={chosen.stem !== null && !part.trim()} {...props}>
               <Trans>Choose a table</Trans>

@@ -126,6 +126,7 @@ export function exampleTable(kind: TableKind, demand: Demand, roads: readonly st
       `${a},110,125,140`,
     ],
     profile: ["time,share", "0:00,1", "6:00,6", "12:00,5", "18:00,3"],
+    office: ["station;time;cars", `${a};${timeOfDay(start)};48`, `${a};${timeOfDay(start + 900)};55`],
     zones: ["zone,segment", `centre,${a}`, ...(b === a ? [] : [`centre,${b}`])],
   };
   return `${rows[kind].join("\n")}\n`;

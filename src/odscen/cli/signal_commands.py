@@ -24,6 +24,8 @@ from odscen.cli.scenario_commands import ScenarioArgument
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import polars as pl
+
     from odscen.app.signals.signal_evaluation import SignalEvaluation
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
@@ -146,6 +148,111 @@ def import_(
         print_json({"scenario": str(path), "notes": list(notes)})
     else:
         log(f"wrote {path}")
+
+
+@app.command()
+def play_log(
+    scenario: ScenarioArgument,
+    file: Annotated[
+        Path,
+        typer.Argument(help="Event log: time, device, event, parameter.", metavar="LOG"),
+    ],
+    junction: Annotated[str, typer.Option("--junction", help="The light.")],
+    phase: Annotated[
+        list[str],
+        typer.Option(
+            "--phase",
+            help="Phase of the controller and the movements it shows green to: 2=r12, "
+            "'5=r12 left', 'P2=walk r8' (walk), O1=r3 (overlap); once for each.",
+            metavar="PHASE=MOVEMENT,...",
+        ),
+    ],
+    device: Annotated[
+        str | None, typer.Option("--device", help="Controller of the log. (default: the only one)")
+    ] = None,
+    begin: Annotated[
+        str | None,
+        typer.Option(
+            "--begin",
+            help="Time of the log at which the run begins: 12:30. (default: the scenario's time of "
+            "day, or the first event)",
+        ),
+    ] = None,
+    out: OutOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Let a light show what the log of its controller says, second by second."""
+    from odscen.app import scenarios
+    from odscen.app.signals.controller_logs import play_controller_log
+    from odscen.maps.store import Workspace
+
+    phases: dict[str, list[str]] = {}
+    for given in phase:
+        name, equals, movements = given.partition("=")
+        if not equals:
+            raise typer.BadParameter(f"{given!r} has no '='", param_hint="--phase")
+        phases.setdefault(name.strip(), []).extend(m.strip() for m in movements.split(","))
+    document, notes = play_controller_log(
+        Workspace.open(workspace),
+        scenario,
+        file,
+        junction=junction,
+        phases=phases,
+        device=device,
+        begin=begin,
+    )
+    path = scenarios.write_scenario(document, out or scenario)
+    for note in notes:
+        log(note)
+    if as_json:
+        print_json({"scenario": str(path), "notes": list(notes)})
+    else:
+        log(f"wrote {path}")
+
+
+@app.command()
+def log_measures(
+    file: Annotated[
+        Path,
+        typer.Argument(help="Event log: time, device, event, parameter.", metavar="LOG"),
+    ],
+    detectors: Annotated[
+        Path,
+        typer.Option(
+            "--detectors",
+            help="Table of its detectors: device, phase, parameter, function (advance, presence).",
+        ),
+    ],
+    minutes: Annotated[int, typer.Option("--bin", help="Minutes of a row.", min=1, max=1440)] = 15,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder for the tables, as CSV.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Arrivals on green, split failures and pedestrian delay of a controller's event log."""
+    from odscen.app.signals.controller_logs import controller_measures
+    from odscen.base.text_files import write_text
+
+    found = controller_measures(file, detectors, minutes=minutes)
+    if as_json:
+        print_json({name: _rows_as_json(table) for name, table in found.items()})
+    for name, table in found.items():
+        if not as_json and name != "arrivals":
+            rows = [[_cell(value) for value in row] for row in table.rows()]
+            print_table(name.replace("_", " "), table.columns, rows)
+        if out is not None:
+            log(f"wrote {write_text(out / f'{name}.csv', table.write_csv())}")
+
+
+def _rows_as_json(table: pl.DataFrame) -> list[dict[str, Any]]:
+    import polars.selectors as cs
+
+    return table.with_columns(cs.datetime().dt.to_string("%Y-%m-%dT%H:%M:%S%.3f")).to_dicts()
+
+
+def _cell(value: object) -> str:
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
 @app.command()

@@ -224,7 +224,7 @@ def take_signals(
             for name in views[light.id].names:
                 timings.pop(name, None)
             timings[timing.junction] = timing
-        scenario = _with_raw_programs(scenario, content, raw, found)
+        scenario = with_raw_programs(scenario, content, raw, found)
     signals = changed_part(scenario.signals, {"junctions": tuple(timings.values())})
     refuse_errors(signal_problems(signals, loaded.lights))
     return with_fields(scenario, signals=signals), tuple(notes)
@@ -241,7 +241,7 @@ RAW_PROGRAMS = "programs-in-force.add.xml"
 """File of a scenario with programs that run as they are."""
 
 
-def _with_raw_programs(
+def with_raw_programs(
     scenario: Scenario, content: bytes, raw: Sequence[str], taken: Collection[str]
 ) -> Scenario:
     """Keep the elements of a file that belong to these lights as SUMO's own file.

@@ -614,11 +614,16 @@ class FreeTable:
         )
 
     def _read_places(self) -> TrafficFile:
-        stations = {
-            row[self._index["station"]]: self._station_place(row, line)
-            for row, line in zip(self._table.rows, self._table.lines, strict=True)
-            if row[self._index["station"]]
-        }
+        stations: dict[str, StationPlace] = {}
+        for row, line in zip(self._table.rows, self._table.lines, strict=True):
+            name = row[self._index["station"]]
+            place = self._station_place(row, line)
+            if not name:
+                self._leave_out(line, "no station")
+            elif not _placed({name: place}):
+                self._leave_out(line, f"{name}: no place")
+            else:
+                stations[name] = place
         what = f"a table of {len(stations)} places of stations"
         return self._file(what, len(self._table.rows), stations=stations)
 
@@ -749,7 +754,9 @@ class FreeTable:
         point = None
         degrees = {"lon", "lat"} <= self._index.keys()
         x, y = (number("lon"), number("lat")) if degrees else (number("x"), number("y"))
-        if x is not None and y is not None:
+        if degrees and not (-180 <= (x or 0) <= 180 and -90 <= (y or 0) <= 90):
+            self._leave_out(line, f"longitude {x}, latitude {y}: no such place")
+        elif x is not None and y is not None:
             point = (x, y)
         return StationPlace(word("edge"), word("lane"), number("pos"), point, degrees, bearing)
 

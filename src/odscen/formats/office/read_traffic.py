@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from odscen.base.errors import InputError
 from odscen.base.given_files import MOST
 from odscen.base.xml_reading import read_xml
+from odscen.formats.controller_log import is_controller_log
 from odscen.formats.office.free_table import (
     FreeTable,
     GivenTable,
@@ -45,8 +46,22 @@ def read_traffic(
     Raises
     ------
     InputError
-        If nothing is recognised in it; says what it seems to be.
+        If nothing is recognised in it, or nothing in it can be used; says what it seems to be.
     """
+    read = _read_any(content, options, known_columns)
+    if not (read.trips or read.volumes or read.turns or read.zones or read.stations):
+        why = "its values are missing or 0"
+        if read.left_out:
+            why = f"{read.left_out[0].source}: {read.left_out[0].reason}"
+        raise InputError(f"this is {read.what}, but no row of it can be used: {why}")
+    return read
+
+
+def _read_any(
+    content: bytes,
+    options: ReadingOptions,
+    known_columns: Callable[[GivenTable], Mapping[str, str]] | None,
+) -> TrafficFile:
     if not content.strip():
         raise InputError("the file is empty")
     if content.startswith(b"\x1f\x8b"):
@@ -73,6 +88,11 @@ def _read_table(
     options: ReadingOptions,
     known_columns: Callable[[GivenTable], Mapping[str, str]] | None,
 ) -> TrafficFile:
+    if is_controller_log(table.titles):
+        raise InputError(
+            "this is an event log of a signal controller; `odscen signals play-log` plays it back, "
+            "`odscen signals log-measures` measures it"
+        )
     kept = {} if known_columns is None else dict(known_columns(table))
     if not options.columns:
         options = ReadingOptions(kept, options.interval, options.date, options.time_zone)

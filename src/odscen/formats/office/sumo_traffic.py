@@ -107,6 +107,10 @@ class _Reader:
             kinds.append(f"definitions of {len(self._stations)} SUMO detectors")
         if self._zones:
             kinds.append(f"SUMO districts (taz) with {len(self._zones)} zones")
+        if not kinds and self._left:
+            raise InputError(
+                f"nothing of the file can be used: {self._left[0].source}: {self._left[0].reason}"
+            )
         if not kinds:
             raise InputError(_say_what_it_is(root))
         return TrafficFile(
@@ -133,8 +137,9 @@ class _Reader:
             # Those who passed it whole; a vehicle still on it when the slice ends is in the next.
             key = "nVehContrib" if interval.get("nVehContrib") is not None else "nVehEntered"
             number = self._number(interval, key)
-            if number < 0:
-                self._leave_out(interval, f"{name}: {key} is {number:g}")
+            if number < 0 or not name:
+                reason = f"{name}: {key} is {number:g}" if name else "the detector has no id"
+                self._leave_out(interval, reason)
                 return
             self._outputs.append(VolumeRow(name, begin, end, number, _line(interval)))
             return
@@ -161,7 +166,7 @@ class _Reader:
             self._leave_out(element, f"{origin} to {destination}: no {name}{listed}")
             return
         value = self._number(element, "probability" if share else name)
-        if value < 0:
+        if value < 0 or (share and value > 1):
             self._leave_out(element, f"{origin} to {destination}: {value:g}")
         elif element.tag == "tazRelation":
             if value > 0:
@@ -175,14 +180,22 @@ class _Reader:
         for element in source.iterfind("toEdge"):
             self._rows += 1
             value = self._number(element, "probability")
-            row = TurnRow(
-                source.get("id", ""), element.get("id", ""), value, begin, end, True, _line(element)
-            )
-            self._turns.append(row)
+            origin, destination = source.get("id"), element.get("id")
+            if not origin or not destination:
+                self._leave_out(element, f"<{source.tag}> or <{element.tag}> has no id")
+            elif not 0 <= value <= 1:
+                self._leave_out(element, f"{origin} to {destination}: {value:g}")
+            else:
+                self._turns.append(
+                    TurnRow(origin, destination, value, begin, end, True, _line(element))
+                )
 
     def _read_edge(self, element: etree._Element, begin: float, end: float) -> None:
         self._rows += 1
         edge = element.get("id", "")
+        if not edge:
+            self._leave_out(element, "the edge has no id")
+            return
         if self._attribute is not None:
             names = [self._attribute] if element.get(self._attribute) is not None else []
         elif element.get("entered") is not None:
@@ -228,8 +241,13 @@ class _Reader:
         for part in element:
             if part.tag in ("tazSource", "tazSink"):
                 edges.append(part.get("id", ""))
+        edges = [edge for edge in edges if edge]
         if not name or not edges:
-            self._leave_out(element, f"{shown(name)}: a district without edges")
+            reason = f"{shown(name)}: a district without edges" if name else "a district without id"
+            self._leave_out(element, reason)
+            return
+        if name in self._zones:
+            self._leave_out(element, f"district {shown(name)} is there twice")
             return
         self._zones[name] = tuple(dict.fromkeys(edges))
 

@@ -21,6 +21,8 @@ _HEAD = re.compile(r"\$([A-Z])([A-Z]*)(?:;(.*))?", re.IGNORECASE)
 _CLOCK = re.compile(r"(\d{1,2})(?:[.:](\d{1,2}))?(?:[.:](\d{1,2}))?")
 MOST_ZONES = 5_000
 """Zones of a matrix: a square of them is in memory."""
+MOST_TRIPS = 1e7
+"""Trips of a cell."""
 
 
 class _Line(NamedTuple):
@@ -82,6 +84,8 @@ def read_visum_matrix(text: str) -> TrafficFile:
         )
     factor_line = _require_line(lines, "the factor")
     factor = _number(factor_line.text.strip(), factor_line.number, comma=comma)
+    if factor <= 0:
+        raise InputError(f"the factor is {factor:g}", element=f"line {factor_line.number}")
     if form == "V":
         rows, zones, left = _read_square(lines, comma=comma)
     else:
@@ -160,6 +164,9 @@ def _read_square(
         zones += _require_line(lines, f"the numbers of {size} zones").text.split()
     if len(zones) > size:
         raise InputError(f"{len(zones)} numbers of zones are given, {size} were announced")
+    twice = next((zone for n, zone in enumerate(zones) if zone in zones[:n]), None)
+    if twice is not None:
+        raise InputError(f"zone {shown(twice)} is there twice")
     words = ((line.number, word) for line in lines for word in line.text.split())
     rows: list[TripRow] = []
     left: list[LeftOut] = []
@@ -170,7 +177,7 @@ def _read_square(
         line, word = found
         value = _number(word, line, comma=comma)
         origin, destination = zones[index // size], zones[index % size]
-        if value < 0:
+        if not 0 <= value <= MOST_TRIPS:
             left.append(
                 LeftOut(f"row {line} of the file", f"{origin} to {destination}: {value:g} trips")
             )
@@ -201,7 +208,7 @@ def _read_pairs(
         origin, destination, word = words
         zones |= dict.fromkeys((origin, destination))
         value = _number(word, line.number, comma=comma)
-        if value < 0:
+        if not 0 <= value <= MOST_TRIPS:
             reason = f"{origin} to {destination}: {value:g} trips"
             left.append(LeftOut(f"row {line.number} of the file", reason))
         else:

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from fastapi import APIRouter, File, Form, UploadFile
 
 from odscen.app.demand import demands
-from odscen.base.errors import InputError
+from odscen.app.demand.traffic_files import put_traffic
+from odscen.base.errors import InputError, in_file
+from odscen.formats.office.read_traffic import read_traffic
 from odscen.scenario.document.document_parts import Identifier
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.web.jobs import JobResult
@@ -38,13 +40,28 @@ def table(
     shared: Shared,
     file: Annotated[UploadFile, File(description="Comma, semicolon or tab separated.")],
     version: Annotated[Version, Form()],
-    kind: Annotated[Literal["od", "inputs", "counts", "profile", "zones"], Form()],
+    kind: Annotated[Literal["od", "inputs", "counts", "profile", "zones", "office"], Form()],
     part: Annotated[Identifier | None, Form(description="Name of what is read in.")] = None,
     day: Annotated[Identifier | None, Form(description="Day profile of trips.")] = None,
 ) -> ScenarioState:
-    """Read a table into a scenario, all of it or nothing; see ``docs/demand.md``."""
+    """Read a table into a scenario, all of it or nothing; see ``docs/demand.md``.
+
+    Of the kind ``office`` is whatever :func:`odscen.formats.office.read_traffic.read_traffic`
+    reads; see ``docs/office-files.md``.
+    """
+    content = file.file.read()
+    if kind == "office":
+        with in_file(file.filename or ""):
+            read = read_traffic(content)
+
+        def take(scenario: Scenario) -> Scenario:
+            with in_file(file.filename or ""):
+                return put_traffic(shared.map_of(scenario), scenario, read, name=part)[0]
+
+        label = f"Import of {read.what}"
+        return state_of(shared, shared.drafts.change(name, version, label, take))
     try:
-        text = file.file.read().decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
             "this is not a text file in UTF-8; save the table as CSV (UTF-8)", file=file.filename
@@ -52,10 +69,28 @@ def table(
 
     def change(scenario: Scenario) -> Scenario:
         loaded = shared.map_of(scenario)
-        return demands.import_text(loaded, scenario, text, kind=kind, name=part, day=day)
+        try:
+            return demands.import_text(loaded, scenario, text, kind=kind, name=part, day=day)
+        except InputError as error:
+            what = _name_foreign_file(content)
+            if what is None:
+                raise
+            raise InputError(
+                f"{error.problem}; this seems to be {what}: choose the contents "
+                "'File of another program'",
+                file=file.filename,
+            ) from error
 
     label = f"Table of {_WORDS[kind]}"
     return state_of(shared, shared.drafts.change(name, version, label, change))
+
+
+def _name_foreign_file(content: bytes) -> str | None:
+    """What a file is that does not have our own columns; ``None`` if nobody knows."""
+    try:
+        return read_traffic(content).what
+    except InputError:
+        return None
 
 
 @router.get("/entries")
