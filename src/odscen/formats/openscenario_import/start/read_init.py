@@ -462,7 +462,10 @@ class InitReader:
             made |= self._places.vehicle(entity, centre) | {"style": STEADY, "initial_speed": first}
             goals = [action["goal"]["to"] for action in then if "goal" in action]
             made |= {"goal": self._places.reached(entity, made, goals[-1])} if goals else {}
-            then = [action for action in then if "goal" not in action]
+            drivers = [action["drive"]["by"] for action in then if "drive" in action]
+            driver = drivers[-1] if drivers else "story"
+            made |= {"driver": driver} if driver == "story" and not free else {}
+            then = [action for action in then if "goal" not in action and "drive" not in action]
             if not changes:
                 then.append({"speed": {"to": 0.0, "shape": "step"}})
             then = self._places.at_first(centre, left, then, made)
