@@ -10,7 +10,6 @@ from odscen.base.categories import Category
 from odscen.scenario.checks.scenario_checks import check
 from tests.sumo.story_case import (
     MIDDLE,
-    RIGHT,
     document,
     loaded,
     node_at,
@@ -63,22 +62,18 @@ def test_a_car_without_events_hits_the_stopped_one_when_the_gap_is_covered(
     assert ego.x == pytest.approx(ego.x[0] + 15.0 * ego.time, abs=0.05)
 
 
-def test_sumo_and_the_story_take_turns_when_rules_say_so(tmp_path: Path) -> None:
-    """Whom a rule gives to the story hits the car ahead; whom one gives to SUMO does not."""
-    actors = [
-        car("ego", 370.0, 15.0, ego=True, driver="sumo"), car("other", 455.0, 0.0),
-        car("third", 370.0, 15.0, RIGHT), car("fourth", 455.0, 0.0, RIGHT),
-    ]  # fmt: skip
-    rules = [
-        after(1.0, {"drive": {"by": "story"}}),
-        after(1.0, {"drive": {"by": "sumo"}}, actor="third", name="given"),
-    ]
-    found = run(document(MOTORWAY, actors, rules), tmp_path / "run")
-    hits = [{one.actor, one.partner} for one in found.events if one.kind == "collision"]
-    assert hits == [{"ego", "other"}]
-    later = found.tracks["ego"].time > 1.05
-    speed = found.tracks["ego"].speed[later]
-    assert speed == pytest.approx(speed[0], abs=0.01)
+@pytest.mark.parametrize(("first", "then", "hits"), [("sumo", "story", 1), ("story", "sumo", 0)])
+def test_a_rule_gives_a_car_to_the_story_or_to_sumo(
+    tmp_path: Path, first: str, then: str, hits: int
+) -> None:
+    """By the story it hits the stopped car 80 m ahead; by SUMO it does not."""
+    actors = [car("ego", 370.0, 15.0, ego=True, driver=first), car("other", 455.0, 0.0)]
+    rules = [after(1.0, {"drive": {"by": then}})]
+    found = run(document(MOTORWAY, actors, rules, until=10.0), tmp_path / "run")
+    assert len([one for one in found.events if one.kind == "collision"]) == hits
+    if hits:
+        later = found.tracks["ego"].speed[found.tracks["ego"].time > 1.05]
+        assert later == pytest.approx(later[0], abs=0.01)
 
 
 def test_after_a_rule_the_story_keeps_what_the_rule_left(tmp_path: Path) -> None:
