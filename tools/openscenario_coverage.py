@@ -50,7 +50,11 @@ PASSED: Final = frozenset({
 })  # fmt: skip
 """Read without being named, as content of what they stand in."""
 _LOOKS: Final = "ignored", "controllers, lights and looks do not act in SUMO; `--ego`"
+_CONTROLLERS: Final = "approximated", "SUMO drives where a controller is activated, else the story"
 REMARKS: Final = {
+    "ActivateControllerAction": _CONTROLLERS,
+    "AssignControllerAction": _CONTROLLERS,
+    "ControllerAction": _CONTROLLERS,
     "ObjectController": ("ignored", "a controller is a program beside the file; `--ego`"),
     "GlobalAction": ("approximated", "as far as the actions in it"),
     "EnvironmentAction": ("read", "at first; in a story the weather stays as it is"),
@@ -156,10 +160,10 @@ def covered() -> list[Covered]:
 def _verdicts(parents: dict[str, set[str]], read: frozenset[str]) -> dict[str, tuple[str, str]]:
     found: dict[str, tuple[str, str]] = {}
     for element, above in parents.items():
-        if element in IGNORED:
-            found[element] = _LOOKS
-        elif element in REMARKS:
+        if element in REMARKS:
             found[element] = REMARKS[element]
+        elif element in IGNORED:
+            found[element] = _LOOKS
         elif element in read:
             found[element] = "read", ""
         elif above & ACTING:

@@ -29,6 +29,7 @@ export const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
   ego: false,
   crosses_anywhere: false,
   ignores_red: false,
+  driver: "sumo",
 });
 export const flow = (id: string, spawn: string): Flow => ({
   id,

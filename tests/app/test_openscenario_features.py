@@ -421,6 +421,49 @@ def test_what_would_act_is_refused_with_its_reason(
     assert {one.id for one in found.scenario.rules} >= {"cut-in", "later"}
 
 
+OFFSET = """<LateralAction><LaneOffsetAction continuous="true"><LaneOffsetActionDynamics
+dynamicsShape="linear"/><LaneOffsetTarget><AbsoluteTargetLaneOffset value="{}"/></LaneOffsetTarget>
+</LaneOffsetAction></LateralAction>"""
+LANES = """<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="sinusoidal"
+value="3" dynamicsDimension="time"/><LaneChangeTarget><RelativeTargetLane entityRef="Other"
+value="{}"/></LaneChangeTarget></LaneChangeAction></LateralAction>"""
+PROFILE = """<LongitudinalAction><SpeedProfileAction followingMode="position">
+<SpeedProfileEntry time="2" speed="10"/><SpeedProfileEntry time="3" speed="4"/>
+</SpeedProfileAction></LongitudinalAction>"""
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        (
+            OFFSET.format(14),
+            "then[0].offset.to: Input should be less than or equal to 10, not 14.0",
+        ),
+        (LANES.format(13), "then[0].lane.by: Input should be less than or equal to 10, not 13"),
+    ],
+)
+def test_what_is_beyond_the_bounds_of_rules_is_refused_with_its_value(
+    workspace: Workspace, tmp_path: Path, action: str, words: str
+) -> None:
+    found = read(workspace, tmp_path, scene(event("more", private(action))))
+    assert any(words in reason for reason in reasons(found, "refused"))
+    assert "later" in {one.id for one in found.scenario.rules}
+
+
+def test_a_speed_profile_at_first_is_a_rule_of_its_entries(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    more = f'<Private entityRef="Ego">{private(PROFILE)}</Private>'
+    found = read(workspace, tmp_path, scene(Actions=more))
+    assert found.lists["refused"] == []
+    speeds = [
+        [item.speed.to for item in rule.then if item.speed]
+        for rule in found.scenario.rules
+        if rule.actor == "Ego"
+    ]
+    assert [10.0, 4.0] in speeds
+
+
 def test_a_falling_edge_a_delay_and_a_count_are_those_of_the_rule(
     workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -84,7 +84,7 @@ def scenario() -> Scenario:
         ],
         "rule": [{"goal": {"to": goal}}],
         "touched": [{"vanish": {}}],
-        "off_road": [{"release": {}}],
+        "off_road": [{"release": {}}, {"drive": {"by": "story"}}],
         "both": [{"lights": {"indicator": "left", "brake": True}}],
     }
     rules = [

@@ -737,6 +737,7 @@ export interface components {
             horn?: components["schemas"]["Honking"] | null;
             ignore?: components["schemas"]["Ignoring-Input"] | null;
             release?: components["schemas"]["Releasing"] | null;
+            drive?: components["schemas"]["Driving"] | null;
             own?: components["schemas"]["OwnAction-Input"] | null;
             together?: components["schemas"]["Action-Input"][] | null;
         };
@@ -763,6 +764,7 @@ export interface components {
             horn: components["schemas"]["Honking"] | null;
             ignore: components["schemas"]["Ignoring-Output"] | null;
             release: components["schemas"]["Releasing"] | null;
+            drive: components["schemas"]["Driving"] | null;
             own: components["schemas"]["OwnAction-Output"] | null;
             together: components["schemas"]["Action-Output"][] | null;
         };
@@ -775,7 +777,9 @@ export interface components {
          *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
          *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
          *     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
-         *     their order; an open goal is one that can be reached from the last of them.
+         *     their order; an open goal is one that can be reached from the last of them. ``driver`` is who
+         *     drives a vehicle that no rule moves: SUMO, or the ``story`` alone, which keeps its initial speed
+         *     and its lane whatever is in the way.
          */
         Actor: {
             id: string;
@@ -799,6 +803,11 @@ export interface components {
             crosses_anywhere: boolean;
             /** @default false */
             ignores_red: boolean;
+            /**
+             * @default sumo
+             * @enum {string}
+             */
+            driver: "sumo" | "story";
         };
         /** @description What a criterion can ask of one actor. */
         ActorMeasureInfo: {
@@ -836,6 +845,8 @@ export interface components {
             ego?: boolean;
             crosses_anywhere?: boolean;
             ignores_red?: boolean;
+            /** @enum {string} */
+            driver?: "sumo" | "story";
         };
         /** @description Put a flow on a node (R44); ``fields`` are further fields of ``Flow``. */
         AddFlowEdit: {
@@ -1128,6 +1139,8 @@ export interface components {
             ego?: boolean;
             crosses_anywhere?: boolean;
             ignores_red?: boolean;
+            /** @enum {string} */
+            driver?: "sumo" | "story";
             actor: string;
         };
         /** @description Change any fields of a flow. */
@@ -1798,6 +1811,16 @@ export interface components {
             shares: {
                 [key: string]: number;
             };
+        };
+        /**
+         * @description From now on a vehicle is driven by the story alone or by SUMO.
+         *
+         *     The story alone keeps speed and lane until a rule changes them, whatever is in the way, and
+         *     heeds neither lights nor right of way.
+         */
+        Driving: {
+            /** @enum {string} */
+            by: "sumo" | "story";
         };
         /** @description Edges between nodes; ``relation`` 0 is successor, 1 left, 2 right. */
         EdgeColumns: {
@@ -3086,7 +3109,7 @@ export interface components {
             /** @default 1 */
             within: number;
         };
-        /** @description SUMO drives as if there had been no rule. */
+        /** @description The actor is driven as if there had been no rule: by whom its ``driver`` names. */
         Releasing: Record<string, never>;
         /** @description What stays behind, and needs what is to be removed. */
         RemovalInfo: {

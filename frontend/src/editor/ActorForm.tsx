@@ -2,7 +2,7 @@ import { Checkbox, Group, Select, Stack } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
 import type { Actor, Assets, Edit } from "../api/types";
-import { modelWord, styleChoices } from "../ui/words";
+import { DRIVERS, modelWord, styleChoices } from "../ui/words";
 import { Committed } from "./Committed";
 import { bodyOf } from "./scene";
 import { Silhouette } from "./Silhouette";
@@ -83,6 +83,20 @@ export function ActorForm({
             }}
           />
         </Group>
+      )}
+      {!walks && (
+        <Select
+          label={t`Driven by`}
+          description={
+            actor.driver === "story" ? t`Keeps its speed and lane, and hits what is in the way` : undefined
+          }
+          allowDeselect={false}
+          value={actor.driver}
+          data={Object.entries(DRIVERS()).map(([value, label]) => ({ value, label }))}
+          onChange={(driver) => {
+            if (driver === "sumo" || driver === "story") change({ driver });
+          }}
+        />
       )}
       {!walks && (
         <Checkbox

@@ -5,7 +5,7 @@ import { everyone } from "./placing";
 import { shownRule, waitingFor } from "./rules/shownRule";
 
 /** What is not said of a new road user or flow; a test holds it against the server's own defaults. */
-const NEW_ACTOR: Omit<Actor, "id" | "category" | "spawn"> = newParts.actor;
+const NEW_ACTOR = newParts.actor as Omit<Actor, "id" | "category" | "spawn">; // JSON has texts
 type Measure = ScenarioDocument["measures"][number];
 const NEW_FLOW: Omit<Flow, "id" | "spawn" | "per_hour"> = newParts.flow;
 

@@ -38,6 +38,9 @@ export const styleWord = (style: string): string =>
 export const styleChoices = (sets: readonly string[]): { value: string; label: string }[] =>
   [...Object.keys(STYLE_WORD()), ...sets].map((value) => ({ value, label: styleWord(value) }));
 
+/** Who drives a vehicle that no rule moves. */
+export const DRIVERS = localized(() => ({ sumo: t`SUMO's drivers`, story: t`The story alone` }));
+
 /** A flow in words, by whether its road users are on foot. */
 export const flowWord = (walks: boolean): string => (walks ? t`Pedestrian flow` : t`Vehicle flow`);
 

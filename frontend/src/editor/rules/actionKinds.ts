@@ -18,7 +18,7 @@ import {
   TO,
   type Values,
 } from "./fields";
-import { sentence } from "../../ui/words";
+import { DRIVERS, sentence } from "../../ui/words";
 
 type Action = ScenarioDocument["rules"][number]["then"][number];
 export type ActionKind = Exclude<keyof Action, "together">;
@@ -286,6 +286,11 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
     words: ignored,
   },
   release: { label: t`Release`, fields: [], words: () => t`drive as if there had been no rule` },
+  drive: {
+    label: t`Change its driver`,
+    fields: [{ is: "choice", name: "by", label: t`Driven by`, choices: DRIVERS() }],
+    words: (v) => (v.by === "sumo" ? t`be driven by SUMO` : t`keep speed and lane, whatever is in the way`),
+  },
   own: {
     label: t`Of an installed package`,
     fields: OWN(),

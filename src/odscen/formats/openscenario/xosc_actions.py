@@ -121,8 +121,15 @@ def _write_go(made: Actions, _part: Any, _actor: str, _where: str) -> list[_Elem
     return [_controller_action(made, longitudinal=True)]
 
 
-def _write_release(made: Actions, _part: Any, _actor: str, _where: str) -> list[_Element]:
-    return [_controller_action(made, lateral=True, longitudinal=True)]
+def _write_release(made: Actions, _part: Any, actor: str, _where: str) -> list[_Element]:
+    known = made.actors.get(actor)
+    by_sumo = known is None or known.driver == "sumo"
+    return [_controller_action(made, lateral=by_sumo, longitudinal=by_sumo)]
+
+
+def _write_drive(made: Actions, part: Any, _actor: str, _where: str) -> list[_Element]:
+    by_sumo = part.by == "sumo"
+    return [_controller_action(made, lateral=by_sumo, longitudinal=by_sumo)]
 
 
 def _lane_change(over: float, target: _Element, offset: float | None = None) -> _Element:
@@ -345,6 +352,7 @@ _MAKERS: Final[Mapping[str, Callable[[Actions, Any, str, str], list[_Element]]]]
     "vanish": _write_vanish,
     "lights": _write_lights,
     "release": _write_release,
+    "drive": _write_drive,
     "ignore": _write_ignore,
     "signal": _write_signal,
 }

@@ -146,7 +146,7 @@ class AsRun:
 
 def _write_lights(shown: dict[str, str]) -> Iterator[_Element]:
     for signal, state in shown.items():
-        yield light_action(signal, state.lower())
+        yield light_action(signal, state)
 
 
 def lines_of(recorded: RecordedRun) -> _Lines:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from odscen.convert.lane_table.light_heads import SignalHeads
 from odscen.formats.openscenario.dialect import xml
@@ -21,9 +21,25 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.sumo_map import SumoMap
 
 
-def light_action(signal: str, state: str) -> _Element:
+_LAMPS: Final = {
+    "red": "on;off;off",
+    "yellow": "off;on;off",
+    "green": "off;off;on",
+    "off": "off;off;off",
+}
+
+
+def lamps_of(colour: str) -> str:
+    """State of a signal of three lamps, from the top, that shows a colour or is off.
+
+    esmini knows modes of lamps and no colours: it refuses a file with a state ``green``.
+    """
+    return _LAMPS[colour.lower()]
+
+
+def light_action(signal: str, colour: str) -> _Element:
     """``GlobalAction`` that makes a signal show ``red``, ``yellow``, ``green`` or ``off``."""
-    return lights_action(xml("TrafficSignalStateAction", name=signal, state=state))
+    return lights_action(xml("TrafficSignalStateAction", name=signal, state=lamps_of(colour)))
 
 
 def lights_action(content: _Element) -> _Element:
@@ -111,7 +127,7 @@ def _write_controller(light: SumoLight, program: LightProgram, notes: ExportNote
     for number, phase in enumerate(from_the_start(plan), start=1):
         shown = heads.states({light.id: phase.state})
         states = [
-            xml("TrafficSignalState", trafficSignalId=signal, state=state.lower())
+            xml("TrafficSignalState", trafficSignalId=signal, state=lamps_of(state))
             for signal, state in sorted(shown.items())
         ]
         about = {"name": _phase_name(number, phase), "duration": float(phase.seconds)}

@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.formats.openscenario.dialect import xml
-from odscen.formats.openscenario.xosc_signals import movement_of, signal_of
+from odscen.formats.openscenario.xosc_signals import lamps_of, movement_of, signal_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -326,7 +326,7 @@ def _write_signal(made: Triggers, leaf: Leaf) -> _Element:
     if again is not None and again != (leaf.part.light, leaf.part.movement):
         words = f"the signal, which odscen reads as movement {again[1]!r}"
         made.notes.approximated.append((leaf.place, words))
-    return xml("TrafficSignalCondition", name=signal, state=leaf.part.shows)
+    return xml("TrafficSignalCondition", name=signal, state=lamps_of(leaf.part.shows))
 
 
 def _write_rule(made: Triggers, leaf: Leaf) -> _Element:

@@ -98,6 +98,13 @@ def actor_problems(
             f"{subject.where}.ego",
             f"{subject.name} is a pedestrian; only a vehicle can be the ego",
         )
+    if actor.driver != "sumo" and on_foot(actor.category):
+        yield error(
+            "driver_not_possible",
+            f"{subject.where}.driver",
+            f"{subject.name} is a pedestrian, who has no driver; leave it out, and let "
+            "rules say where it walks",
+        )
     if actor.depart >= scenario.simulation.duration:
         yield warning(
             "departs_too_late",
@@ -122,7 +129,7 @@ def actor_problems(
 def _initial_speed_problems(subject: Subject, spawn: NodePlace) -> Iterator[Problem]:
     """Yield what is odd about the speed at departure, which SUMO bounds."""
     one = subject.one
-    if one.initial_speed is None or spawn.walk:
+    if one.initial_speed is None or spawn.walk or getattr(one, "driver", "sumo") == "story":
         return
     limit = float(subject.region.graph.lanes.speed_limit[spawn.node])
     # Who wants to be faster than the limit may be.

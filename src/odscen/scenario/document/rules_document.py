@@ -465,7 +465,21 @@ class Ignoring(Part):
 
 
 class Releasing(Part):
-    """SUMO drives as if there had been no rule."""
+    """The actor is driven as if there had been no rule: by whom its ``driver`` names."""
+
+
+DriverName = Literal["sumo", "story"]
+"""Who drives a vehicle: SUMO's drivers, or the story alone."""
+
+
+class Driving(Part):
+    """From now on a vehicle is driven by the story alone or by SUMO.
+
+    The story alone keeps speed and lane until a rule changes them, whatever is in the way, and
+    heeds neither lights nor right of way.
+    """
+
+    by: DriverName
 
 
 class OwnAction(OwnKind):
@@ -496,6 +510,7 @@ class Action(Part):
     horn: Honking | None = None
     ignore: Ignoring | None = None
     release: Releasing | None = None
+    drive: Driving | None = None
     own: OwnAction | None = None
     together: Annotated[tuple[Action, ...], Field(min_length=2)] | None = None
 

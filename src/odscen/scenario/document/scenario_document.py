@@ -28,7 +28,7 @@ from odscen.scenario.document.distributions import Constant, WrittenDistribution
 from odscen.scenario.document.document_parts import PRINTABLE, Identifier, Label, Part, Seconds
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.measures_document import Measure
-from odscen.scenario.document.rules_document import StoryRule
+from odscen.scenario.document.rules_document import DriverName, StoryRule
 from odscen.scenario.document.signals_document import Signals
 from odscen.scenario.document.sumo_document import SumoProject
 
@@ -347,7 +347,9 @@ class Actor(Part):
     positive to the left of the driving direction. ``style`` is a driving style or the id of a
     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
-    their order; an open goal is one that can be reached from the last of them.
+    their order; an open goal is one that can be reached from the last of them. ``driver`` is who
+    drives a vehicle that no rule moves: SUMO, or the ``story`` alone, which keeps its initial speed
+    and its lane whatever is in the way.
     """
 
     id: Identifier
@@ -364,6 +366,7 @@ class Actor(Part):
     ego: bool = False
     crosses_anywhere: bool = False
     ignores_red: bool = False
+    driver: DriverName = "sumo"
 
 
 class Flow(Part):
@@ -677,10 +680,15 @@ class Scenario(Part):
 
     __str__ = __repr__
 
+    @property
+    def by_story(self) -> tuple[Actor, ...]:
+        """Actors whom the story alone drives unless a rule says otherwise."""
+        return tuple(actor for actor in self.actors if actor.driver == "story")
+
     @model_validator(mode="after")
     def _fine_steps(self) -> Self:
         """With rules, steps are short unless the document says how long."""
-        if self.rules and "step_length" not in self.simulation.model_fields_set:
+        if (self.rules or self.by_story) and "step_length" not in self.simulation.model_fields_set:
             fine = self.simulation.model_copy(update={"step_length": STEP_WITH_RULES})
             self.__dict__["simulation"] = fine  # frozen, but not yet handed out
         return self

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         Arriving,
         Braking,
         CuttingIn,
+        Driving,
         GapKeeping,
         Going,
         Ignoring,
@@ -845,10 +846,19 @@ def _begin_ignore(part: Ignoring, acting_actor: ActingActor) -> float:
 def _begin_release(_: Releasing, acting_actor: ActingActor) -> float:
     channel = acting_actor.channel
     channel.rejoins = acting_actor.actor.person and channel.line is not None
+    channel.by_story = channel.usually_by_story
     channel.release_line()
     channel.release_speed(acting_actor.instant)
     channel.ignore_red = channel.ignore_right_of_way = channel.keeps_lane = False
     channel.lights = None
+    return acting_actor.instant
+
+
+def _begin_drive(part: Driving, acting_actor: ActingActor) -> float:
+    if part.by == "story":
+        acting_actor.channel.drive_by_story(acting_actor.instant)
+    else:
+        acting_actor.channel.drive_by_sumo(acting_actor.instant)
     return acting_actor.instant
 
 
@@ -972,8 +982,15 @@ ACTIONS = {
             sound_horn, says=said_of_horn, vehicles_only=True,
         ),
         ActionKind(
-            "release", "SUMO drives as if there had been no rule", "", "all of the above undone",
+            "release", "it is driven as if there had been no rule: by its `driver`", "",
+            "all of the above undone",
             "ActivateControllerAction", _MIRRORED, _begin_release,
+        ),
+        ActionKind(
+            "drive", "from now on the vehicle is driven `by` the `story` alone (it keeps speed and "
+            "lane until a rule changes them, and hits what is in the way) or by SUMO", "",
+            "`setSpeed` each step, without SUMO's checks", "ActivateControllerAction", _MIRRORED,
+            _begin_drive, vehicles_only=True,
         ),
         ActionKind(
             "own", "a `kind` that an installed package gives, with its `values`", "its own",

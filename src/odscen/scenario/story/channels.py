@@ -99,6 +99,9 @@ class Channel:
         Whether the law has ended in this step, so that its last speed is reached in the next.
     speed_owner, line_owner
         Who has taken over speed and place: rule and number of the action.
+    by_story, usually_by_story
+        Whether the story alone drives the vehicle now, and whenever no rule says who does: what no
+        rule moves then keeps its speed and lane, whatever is in the way.
     """
 
     law: AnyLaw | None = None
@@ -120,12 +123,16 @@ class Channel:
     lights: tuple[str, ...] | None = None
     speed_owner: str | None = None
     line_owner: str | None = None
+    by_story: bool = False
+    usually_by_story: bool = False
     _laws: list[tuple[float, AnyLaw]] = field(default_factory=list)
     _forced: bool = False
 
     @property
     def idle(self) -> bool:
         """Whether nothing is taken over, nor will be: another one would do as well."""
+        if self.by_story or self.usually_by_story:
+            return False
         return self.law is None and self.line is None and not (self.leaves or self.settles)
 
     def begin_step(self, view: ActorView, time: float) -> None:
@@ -164,13 +171,18 @@ class Channel:
     def keep_speed(self) -> None:
         """Let the driver keep the last speed of the law, as far as traffic allows."""
         self.speed_owner = None
-        self.exact = self.line is not None
+        self.exact = self.by_story or self.line is not None
         self.settles = True
 
     def release_speed(self, instant: float) -> None:
-        """Give the speed back to SUMO; in what is left of the step it stays."""
+        """Give the speed back to SUMO; in what is left of the step it stays.
+
+        If the story alone drives, it stays for longer.
+        """
         law = steady(instant, self.speed(instant))
-        self.take_speed(law, None, exact=False)
+        self.take_speed(law, None, exact=self.by_story)
+        if self.by_story:
+            return
         self.law = None
         if self.line is not None:
             self.law, self.borrowed, self.exact = law, True, True
@@ -199,9 +211,26 @@ class Channel:
         """Leave the line."""
         self.line = self.side = self.line_owner = self.headings = None
         self.held = self.leaves = False
+        if self.by_story:
+            self.borrowed, self.exact = False, True
+            return
         if self.borrowed:
             self.law, self.borrowed = None, False
         self.exact = self.law is not None and self.speed_owner is not None
+
+    def drive_by_story(self, time: float, speed: float | None = None) -> None:
+        """Let the story alone drive from an instant of this step on, at a speed or at its own."""
+        self.by_story = True
+        if self.law is None or speed is not None:
+            own = self.speed(time) if speed is None else speed
+            self.take_speed(steady(time, own), None)
+        self.exact = self._forced = True
+
+    def drive_by_sumo(self, instant: float) -> None:
+        """Let SUMO drive from an instant of this step on: no rule has its speed or lane."""
+        self.by_story = self.keeps_lane = False
+        self.release_line()
+        self.release_speed(instant)
 
     def reaches_end(self, time: float, until: float) -> float | None:
         """Instant in this step at which the end of the line is reached, if it is."""
@@ -238,7 +267,7 @@ class Channel:
             pose=pose,
             ignore_red=self.ignore_red,
             ignore_right_of_way=self.ignore_right_of_way,
-            keeps_lane=self.keeps_lane,
+            keeps_lane=self.keeps_lane or self.by_story,
             rejoins=self.rejoins,
             vanishes=self.vanishes,
             goal=self.goal,

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.scenario.document.rules_document import actors_of, rule_parts
@@ -318,6 +319,9 @@ class StoryEngine:
     ----------
     step
         Seconds between two looks.
+    by_story
+        Speeds, m/s, at which the story alone begins to drive vehicles, by their ids; ``None`` is
+        that at which the vehicle is first seen.
 
     Attributes
     ----------
@@ -325,8 +329,15 @@ class StoryEngine:
         Whether rules that cannot fire yet are left alone, as SUMO alone drives whom no rule moves.
     """
 
-    def __init__(self, rules: Sequence[StoryRule], *, step: float) -> None:
+    def __init__(
+        self,
+        rules: Sequence[StoryRule],
+        *,
+        step: float,
+        by_story: Mapping[str, float | None] = MappingProxyType({}),
+    ) -> None:
         self.patient = True
+        self._by_story = by_story
         self._rules = {rule.id: rule for rule in rules}
         self._step = step
         self._trees = {rule.id: ConditionTree(rule, step) for rule in rules}
@@ -422,6 +433,11 @@ class StoryEngine:
         self._channels = {name: Channel.from_state(one) for name, one in state["channels"].items()}
 
     def _begin_step(self, view: RoadView) -> None:
+        for name, speed in self._by_story.items():
+            actor = None if name in self._channels else view.actor(name)
+            if actor is not None:
+                channel = self._add_channel(actor, view.time)
+                channel.drive_by_story(view.time, speed)
         for name in list(self._channels):
             actor = view.actor(name)
             if actor is None:
@@ -447,7 +463,7 @@ class StoryEngine:
 
     def _until_something(self, time: float) -> float:
         """Instant before which nothing can happen if nobody is put elsewhere."""
-        if self._channels or self._busy:
+        if self._channels or self._busy or self._by_story:
             return -math.inf
         least = math.inf
         for name, rule in self._rules.items():
@@ -598,11 +614,16 @@ class StoryEngine:
             raise CannotAct(f"{rule.actor!r} is not on the road")
         channel = self._channels.get(actor.id)
         if channel is None:
-            channel = self._channels[actor.id] = Channel()
-            self._quiet.end(actor.id)
-            channel.begin_step(actor, view.time)
+            channel = self._add_channel(actor, view.time)
         owner = f"{rule.id}/{running.number}"
         return ActingActor(view, actor, channel, now, self._step, owner, self._channels)
+
+    def _add_channel(self, actor: ActorView, time: float) -> Channel:
+        channel = Channel(usually_by_story=actor.id in self._by_story)
+        self._channels[actor.id] = channel
+        self._quiet.end(actor.id)
+        channel.begin_step(actor, time)
+        return channel
 
     def _override_action(self, owner: str, now: float, by: StoryRule) -> None:
         """End an action of another rule, as ``by`` has taken over what it had."""

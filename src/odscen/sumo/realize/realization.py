@@ -222,9 +222,12 @@ def realize(
         writer.notes += project.notes
     if settings.meso and asked.demand.parking.used:
         writer.notes.append("meso: no trip begins or ends in a parking place")
-    if scenario.rules and settings.meso:
-        writer.notes.append("meso: the rules of the scenario are left out")
-    elif scenario.rules or writer.crossings:
+    if settings.meso:
+        if scenario.rules:
+            writer.notes.append("meso: the rules of the scenario are left out")
+        if scenario.by_story:
+            writer.notes.append("meso: SUMO drives whom the story alone drives")
+    elif scenario.rules or writer.crossings or scenario.by_story:
         story = scenario.model_copy(update={"rules": (*scenario.rules, *writer.crossings)})
         files[STORY_FILE] = story_plan(story, sumo_map, demand.held).to_json()
     return Realization(

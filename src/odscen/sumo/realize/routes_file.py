@@ -44,7 +44,8 @@ class RoutesFile:
 
     Every road user that departs at 0 is inserted unconditionally: the scenario has checked that
     bodies do not overlap, and SUMO's own check, which asks for a full safe gap, would delay most of
-    a dense standing crowd. Those who come later wait until SUMO finds room.
+    a dense standing crowd. Those who come later wait until SUMO finds room, but for those whom the
+    story alone drives.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ class RoutesFile:
             attributes.append(("mostSpeed", number(_round_speed_down(most), digits=4)))
             self.held[user.id] = HeldActor(tuple(route.edges), dict(attributes))
             return
-        if user.depart == 0.0:
+        if user.depart == 0.0 or user.design.driver == "story":
             attributes.append(("insertionChecks", "none"))
         lines = [
             f"    <vehicle{_xml_attributes(attributes)}>",

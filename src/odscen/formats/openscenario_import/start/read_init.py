@@ -13,6 +13,7 @@ from odscen.formats.openscenario_import.places.map_points import MapPoint
 from odscen.formats.openscenario_import.places.read_trajectories import read_trajectory
 from odscen.formats.openscenario_import.story.global_actions import tell_unread
 from odscen.formats.openscenario_import.story.read_motions import put_there
+from odscen.formats.openscenario_import.story.read_storyboard import refuse_beyond_bounds
 from odscen.formats.openscenario_import.traced_numbers import TracedNumber
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.lanegraph.shortest_paths import Router
@@ -462,7 +463,10 @@ class InitReader:
             made |= self._places.vehicle(entity, centre) | {"style": STEADY, "initial_speed": first}
             goals = [action["goal"]["to"] for action in then if "goal" in action]
             made |= {"goal": self._places.reached(entity, made, goals[-1])} if goals else {}
-            then = [action for action in then if "goal" not in action]
+            drivers = [action["drive"]["by"] for action in then if "drive" in action]
+            driver = drivers[-1] if drivers else "story"
+            made |= {"driver": driver} if driver == "story" and not free else {}
+            then = [action for action in then if "goal" not in action and "drive" not in action]
             if not changes:
                 then.append({"speed": {"to": 0.0, "shape": "step"}})
             then = self._places.at_first(centre, left, then, made)
@@ -470,8 +474,9 @@ class InitReader:
             made["ego"] = True
         if speed > 0:
             made["speed"] = speed
+        refuse_beyond_bounds(Actor, made, entity.element)
         if late:
             self._story.later[entity.id] = then
         elif not free:
-            self._story.at_once(entity.id, then)
+            self._story.at_once(entity.id, then, entity.element)
         return made

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
+    from odscen.formats.openscenario_import.import_report import ImportReport
     from odscen.formats.openscenario_import.places.map_points import MapPoint
     from odscen.formats.openscenario_import.story.read_conditions import ConditionReader
     from odscen.formats.openscenario_import.world.read_entities import ReadEntity
@@ -124,8 +125,10 @@ class ActionReader:
         """
         report = self.conditions.report
         kind = report.only(element)
-        if self.own and (made := _given_back(element)):
+        if self.own and (made := _given_back(element, entity)):
             report.take(element)
+            return [made]
+        if not self.own and (made := _switch_of_driver(report, kind, entity)):
             return [made]
         if kind.tag in IGNORED:
             report.ignore(kind, "odscen has no controllers and looks of OpenSCENARIO; see --ego")
@@ -158,12 +161,40 @@ class ActionReader:
         return min(max(value, 0.0), 100.0)
 
 
-def _given_back(element: _Element) -> Made | None:
-    """What gives speed, or all, back to SUMO."""
+def _given_back(element: _Element, entity: ReadEntity) -> Made | None:
+    """What gives speed, or all, back to SUMO, or to the story alone."""
     kind = next(element.iter("ActivateControllerAction"), None)
-    if kind is None or kind.get("longitudinal") != "true":
+    if kind is None or kind.get("longitudinal") is None:
         return None
-    return {"release": {}} if kind.get("lateral") == "true" else {"go": {}}
+    axes = [kind.get(name) == "true" for name in ("longitudinal", "lateral")]
+    if axes == [True, False]:
+        return {"go": {}}
+    by = "sumo" if all(axes) else "story"
+    return (
+        {"release": {}} if (entity.own or {}).get("driver", "sumo") == by else {"drive": {"by": by}}
+    )
+
+
+def _switch_of_driver(report: ImportReport, kind: _Element, entity: ReadEntity) -> Made | None:
+    """What gives a vehicle to its controller, for which SUMO drives, or back to the story.
+
+    ``None`` if it does neither: the default controller drives on, or the speed is left to it.
+    """
+    if entity.category is Category.PEDESTRIAN or not entity.controlled:
+        return None
+    switch = next(kind.iter("ActivateControllerAction"), None)
+    says = None if switch is None else switch.get("longitudinal")
+    if says is None:
+        assigned = next(kind.iter("AssignControllerAction"), None)
+        says = None if assigned is None else assigned.get("activateLongitudinal")
+    if says not in ("true", "false"):
+        return None
+    report.take(kind)
+    by = "sumo" if says == "true" else "story"
+    if by == "sumo":
+        words = "SUMO drives in the place of its controller, a program beside the file; see --ego"
+        report.mark(kind, "approximated", words)
+    return {"drive": {"by": by}}
 
 
 def _read_speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:

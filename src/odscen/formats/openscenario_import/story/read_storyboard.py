@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, ScenarioError
 from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.source.own_files import said_in_properties
 from odscen.formats.openscenario_import.story.global_actions import READ, tell_unread
@@ -18,6 +18,8 @@ from odscen.formats.openscenario_import.story.read_conditions import ALWAYS, joi
 from odscen.formats.openscenario_import.story.read_motions import JUMP
 from odscen.formats.openscenario_import.story.value_changes import new_value, sets_in_story
 from odscen.formats.openscenario_import.world.read_entities import plain_id
+from odscen.scenario.document.problems import validated
+from odscen.scenario.document.rules_document import StoryRule
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -27,9 +29,24 @@ if TYPE_CHECKING:
     from odscen.formats.openscenario_import.import_report import ImportReport
     from odscen.formats.openscenario_import.story.read_actions import ActionReader
     from odscen.formats.openscenario_import.world.read_entities import ReadEntity
+    from odscen.scenario.document.scenario_document import Actor
 
 Made = dict[str, Any]
 _HOLDERS = frozenset({"Story", "Act", "ManeuverGroup", "Maneuver"})
+
+
+def refuse_beyond_bounds(kind: type[Actor | StoryRule], made: Made, element: _Element) -> None:
+    """Refuse an element of which an actor or a rule came that a scenario cannot have.
+
+    Raises
+    ------
+    RefusedError
+        With the field and its value.
+    """
+    try:
+        validated(kind, made)
+    except ScenarioError as error:
+        raise RefusedError(element, error.problem) from error
 
 
 class LaterError(RefusedError):
@@ -337,6 +354,7 @@ class StoryReader:
         rule["then"] = then[0].get(FOLLOWING, then) if len(then) == 1 else [{"together": then}]
         if times > 1:
             rule["times"] = min(times, 100_000)
+        refuse_beyond_bounds(StoryRule, rule, event)
         self.rules.append(rule)
         self._made.setdefault(event, []).append(rule)
 
@@ -347,15 +365,22 @@ class StoryReader:
             name = plain_id("end", self._ids)
             self.rules.append({"id": name, "actor": actor, "when": when, "then": [{"end": {}}]})
 
-    def at_once(self, actor: str, then: list[Made]) -> None:
-        """Add what an actor does from the start, or as soon as it has appeared."""
+    def at_once(self, actor: str, then: list[Made], element: _Element) -> None:
+        """Add what an actor does from the start, or as soon as it has appeared.
+
+        Raises
+        ------
+        RefusedError
+            If that is out of the bounds of rules; names the element, which is that of the actor.
+        """
         first, rest = then[:1], then[1:]
         if first and {"appear", "replay", "offset"} & first[0].keys():
             self._placed.add(actor)
         if rest and ("appear" in first[0] or "replay" in first[0]):
             groups = [[*first, *(rest if len(rest) == 1 else [{"together": rest}])]]
         else:
-            groups = [[action] for action in then]
-        for group in groups:
-            name = plain_id(f"init-{actor}", self._ids)
-            self.rules.append({"id": name, "actor": actor, "when": ALWAYS, "then": group})
+            groups = [action.get(FOLLOWING, [action]) for action in then]
+        made = [{"actor": actor, "when": ALWAYS, "then": group} for group in groups]
+        for rule in made:
+            refuse_beyond_bounds(StoryRule, {"id": "init", **rule}, element)
+        self.rules += [{"id": plain_id(f"init-{actor}", self._ids), **rule} for rule in made]

@@ -30,7 +30,8 @@ EGO: Final = re.compile(r"ego|hero|ego_vehicle|host|vut", re.IGNORECASE)
 class ReadEntity:
     """An entity of the file; ``ahead`` is from its reference point to its centre, metres.
 
-    ``own`` are fields of an actor, in a file that odscen wrote.
+    ``own`` are fields of an actor, in a file that odscen wrote. ``controlled`` says whether the
+    file assigns a controller to it anywhere.
     """
 
     element: _Element
@@ -40,6 +41,7 @@ class ReadEntity:
     ahead: float
     ego: bool = False
     obstacle: bool = False
+    controlled: bool = False
     own: dict[str, Any] | None = None
 
 
@@ -71,6 +73,7 @@ def read_entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]
         if one is None:
             report.mark(element, "refused", "its category has no counterpart")
         else:
+            one.controlled = _has_controller(root, element, name)
             found[name] = one
     if is_own(root):
         for one in found.values():
@@ -81,6 +84,22 @@ def read_entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]
     for one in drivers[:1]:
         one.ego = one.category is not Category.PEDESTRIAN
     return found
+
+
+def _has_controller(root: _Element, entity: _Element, name: str) -> bool:
+    """Whether a file assigns a controller to an entity: with its body, at first or in the story."""
+    if entity.find("ObjectController") is not None:
+        return True
+    for action in root.iter("AssignControllerAction"):
+        private = next(action.iterancestors("Private"), None)
+        group = next(action.iterancestors("ManeuverGroup"), None)
+        if private is not None and private.get("entityRef") == name:
+            return True
+        if group is not None and any(
+            ref.get("entityRef") == name for ref in group.iterfind("Actors/EntityRef")
+        ):
+            return True
+    return False
 
 
 def _read_entity(report: ImportReport, thing: _Element, own: str) -> ReadEntity | None:

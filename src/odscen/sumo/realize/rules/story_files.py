@@ -47,12 +47,16 @@ class StoryPlan:
         the whole light, which has no movement.
     held
         Road users that rules let appear.
+    by_story
+        Speeds, m/s, at which the story alone begins to drive vehicles, by their ids; ``None`` is
+        that at which one appears.
     """
 
     rules: tuple[StoryRule, ...]
     places: dict[str, StoryPlace] = field(default_factory=dict)
     signals: dict[tuple[str, str], tuple[str, int]] = field(default_factory=dict)
     held: Mapping[str, HeldActor] = field(default_factory=dict)
+    by_story: Mapping[str, float | None] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """One rule a line; the same plan gives the same text."""
@@ -65,6 +69,8 @@ class StoryPlan:
         head = {"format": FORMAT, "version": VERSION, "places": places, "signals": signals}
         if self.held:
             head["held"] = {name: asdict(one) for name, one in self.held.items()}
+        if self.by_story:
+            head["by_story"] = dict(self.by_story)
         lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
         body = ",\n    ".join(rules)
         return "{\n" + ",\n".join(lines) + f',\n  "rules": [\n    {body}\n  ]\n}}\n'
@@ -87,6 +93,7 @@ class StoryPlan:
                     name: HeldActor(tuple(one["edges"]), one["attributes"], one["person"])
                     for name, one in data.get("held", {}).items()
                 },
+                data.get("by_story", {}),
             )
 
 
@@ -100,7 +107,12 @@ def story_plan(
     ScenarioError
         If a node or a movement is not on the map.
     """
-    plan = StoryPlan(scenario.rules, held=held or {})
+    held = held or {}
+    speeds = {
+        actor.id: None if actor.id in held else actor.initial_speed or 0.0
+        for actor in scenario.by_story
+    }
+    plan = StoryPlan(scenario.rules, held=held, by_story=speeds)
     for index, rule in enumerate(scenario.rules):
         for where, _, part in rule_parts(rule, f"rules[{index}]"):
             for name, place in places_of(part):

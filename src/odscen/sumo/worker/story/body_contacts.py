@@ -11,7 +11,7 @@ from odscen.scenario.story.condition_kinds import overlap
 from odscen.sumo.worker.story.story_view import stranger
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Collection, Iterator, Mapping
 
     from odscen.records.run_plan import PlannedActor
     from odscen.scenario.story.channels import WantedMove
@@ -34,8 +34,12 @@ class BodyContacts:
     """Finds when bodies of moved road users begin to overlap others."""
 
     def __init__(
-        self, planned: Mapping[str, PlannedActor], net_offset: tuple[float, float]
+        self,
+        planned: Mapping[str, PlannedActor],
+        net_offset: tuple[float, float],
+        by_story: Collection[str] = (),
     ) -> None:
+        self._by_story = frozenset(by_story)
         self._planned = planned
         self._offset = net_offset
         self._touching: set[tuple[str, str]] = set()
@@ -83,8 +87,28 @@ class BodyContacts:
         return [
             _contact_event(one, other, time, step)
             for one, other in begun
-            if frozenset((one.id, other.id)) not in known
+            if frozenset((one.id, other.id)) not in known or self._has_exact_instant(one, other)
         ]
+
+    def leave_out_known(self, events: list[Event], time: float, step: float) -> None:
+        """Leave out of the events of a step what SUMO says of contacts that this has found.
+
+        Of vehicles that the story alone drives: they hit each other on their lanes, where SUMO sees
+        it, but on whole steps and without place and speed.
+        """
+        begin = len(events)
+        while begin and events[begin - 1].time > time - step:
+            begin -= 1
+        events[begin:] = [event for event in events[begin:] if not self._is_known(event)]
+
+    def _is_known(self, event: Event) -> bool:
+        if event.kind != EventKind.COLLISION or event.detail == BODIES or event.partner is None:
+            return False
+        pair = min(event.actor, event.partner), max(event.actor, event.partner)
+        return pair in self._touching and not self._by_story.isdisjoint(pair)
+
+    def _has_exact_instant(self, one: ActorView, other: ActorView) -> bool:
+        return one.id in self._by_story or other.id in self._by_story
 
     def _possible_contacts(
         self,

@@ -42,11 +42,11 @@ class StoryRun:
     """The rules of one run, and what SUMO was made to do for them."""
 
     def __init__(self, story: StoryPlan, plan: Plan) -> None:
-        names = set(_names_in_story(story))
+        names = {*_names_in_story(story), *story.by_story}
         self._plan = story
         self._planned = {actor.id: actor for actor in plan.actors}
         self._actors = {actor.id: actor for actor in plan.actors if actor.id in names}
-        self._engine = StoryEngine(story.rules, step=plan.step_length)
+        self._engine = StoryEngine(story.rules, step=plan.step_length, by_story=story.by_story)
         self._view = StoryView(
             story,
             self._actors,
@@ -56,7 +56,7 @@ class StoryRun:
         self._read_wishes(story)
         self._hands = StoryHands(story, self._planned, net_offset=plan.net_offset)
         self._rules = story.rules
-        self._contacts = BodyContacts(self._planned, plan.net_offset)
+        self._contacts = BodyContacts(self._planned, plan.net_offset, story.by_story)
         self._step = plan.step_length
         self._offset = plan.net_offset
         self._road: MovedActors
@@ -137,6 +137,8 @@ class StoryRun:
         self._view.look(road, time, self._step, self._moved_person_speeds() if moved else {})
         self._hands.arrivals(road, recorder, time)
         contacts = self._contacts.look(road, self._view, moved, time, self._step)
+        if self._plan.by_story:
+            self._contacts.leave_out_known(recorder.events, time, self._step)
         if contacts:
             self._look_at_all()
         wanted, events = self._engine.step(self._view)

@@ -1,0 +1,94 @@
+"""Vehicles that the story alone drives: they keep speed and lane, and hit what is in the way."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from odscen.base.categories import Category
+from odscen.scenario.checks.scenario_checks import check
+from tests.sumo.story_case import (
+    MIDDLE,
+    document,
+    loaded,
+    node_at,
+    run,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tests.sumo.story_case import Told
+
+STEPS = (pytest.param(0.05, marks=pytest.mark.slow), 0.1, pytest.param(0.5, marks=pytest.mark.slow))
+MOTORWAY = "motorway_weave"
+
+
+def car(name: str, x: float, speed: float, y: float = MIDDLE, **fields: Any) -> dict[str, Any]:
+    goal = node_at(MOTORWAY, 900.0, MIDDLE)
+    return {
+        "id": name, "category": "car", "spawn": node_at(MOTORWAY, x, y), "goal": goal,
+        "initial_speed": speed, "driver": "story",
+    } | fields  # fmt: skip
+
+
+def after(seconds: float, *then: dict[str, Any], actor: str = "ego", name: str = "r") -> Any:
+    when = {"time": {"after": seconds}}
+    return {"id": name, "actor": actor, "when": when, "then": list(then)}
+
+
+def gap_at_start(found: Told) -> float:
+    ego, other = found.tracks["ego"], found.tracks["other"]
+    return float(other.x[0] - other.length - ego.x[0])
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_a_car_without_events_hits_the_stopped_one_when_the_gap_is_covered(
+    tmp_path: Path, step: float
+) -> None:
+    """15 m/s and about 80 m: the bodies meet after gap / 15 m/s, where the other one stands."""
+    actors = [car("ego", 370.0, 15.0, ego=True), car("other", 455.0, 0.0)]
+    found = run(document(MOTORWAY, actors, [], step=step), tmp_path / "run")
+    gap = gap_at_start(found)
+    assert 75.0 < gap < 85.0
+    [hit] = [one for one in found.events if one.kind == "collision"]
+    assert {hit.actor, hit.partner} == {"ego", "other"}
+    assert hit.time == pytest.approx(gap / 15.0, abs=0.05)
+    other, ego = found.tracks["other"], found.tracks["ego"]
+    assert hit.x == pytest.approx(other.x[0] - other.length, abs=0.05)
+    assert (hit.values or {})["impact_speed"] == pytest.approx(15.0, abs=0.01)
+    # ... and goes on through it, as nothing in the story stops it.
+    assert ego.x == pytest.approx(ego.x[0] + 15.0 * ego.time, abs=0.05)
+
+
+@pytest.mark.parametrize(("first", "then", "hits"), [("sumo", "story", 1), ("story", "sumo", 0)])
+def test_a_rule_gives_a_car_to_the_story_or_to_sumo(
+    tmp_path: Path, first: str, then: str, hits: int
+) -> None:
+    """By the story it hits the stopped car 80 m ahead; by SUMO it does not."""
+    actors = [car("ego", 370.0, 15.0, ego=True, driver=first), car("other", 455.0, 0.0)]
+    rules = [after(1.0, {"drive": {"by": then}})]
+    found = run(document(MOTORWAY, actors, rules, until=10.0), tmp_path / "run")
+    assert len([one for one in found.events if one.kind == "collision"]) == hits
+    if hits:
+        later = found.tracks["ego"].speed[found.tracks["ego"].time > 1.05]
+        assert later == pytest.approx(later[0], abs=0.01)
+
+
+def test_after_a_rule_the_story_keeps_what_the_rule_left(tmp_path: Path) -> None:
+    """Braked to 5 m/s and released it stays at 5 m/s, however free the road is."""
+    actors = [car("ego", 370.0, 15.0, ego=True)]
+    rules = [after(1.0, {"speed": {"to": 5.0, "over": 2.0}}, {"release": {}})]
+    ego = run(document(MOTORWAY, actors, rules), tmp_path / "run").tracks["ego"]
+    assert ego.x[-1] - ego.x[0] == pytest.approx(15.0 + 20.0 + 5.0 * (ego.time[-1] - 3.0), abs=0.05)
+    assert ego.speed[-1] == pytest.approx(5.0, abs=0.01)
+
+
+def test_the_story_drives_no_pedestrian() -> None:
+    scenario = document(MOTORWAY, [car("ego", 370.0, 15.0)], [])
+    walker = scenario.actors[0].model_copy(update={"category": Category.PEDESTRIAN})
+    found = check(
+        scenario.model_copy(update={"actors": (walker,)}), loaded(MOTORWAY).sumo.graph, None
+    )
+    assert ("driver_not_possible", "actors[0].driver") in [(one.code, one.where) for one in found]
