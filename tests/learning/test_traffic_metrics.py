@@ -111,3 +111,14 @@ def test_an_interval_draws_runs_whole() -> None:
     low, high = interval(scenes, measure, draws=30)  # type: ignore[arg-type]
     assert (low, high) == (0.5, 2.5)
     assert {tuple(one) for one in seen} == {(0, 0, 1, 1), (0, 1, 2, 3), (2, 2, 3, 3)}
+
+
+def test_draws_without_a_value_do_not_count_for_an_interval() -> None:
+    scenes = [scene([1], [0.0], name) for name in "ab"]
+
+    def measure(some: list[int]) -> float:
+        return 3.0 if 0 in some else float("nan")
+
+    assert interval(scenes, measure, draws=30) == (3.0, 3.0)  # type: ignore[arg-type]
+    never = interval(scenes, lambda _: float("nan"), draws=3)
+    assert np.isnan(never).all()

@@ -13,6 +13,7 @@ JSD is the Jensen-Shannon divergence in bits of histograms of one quantity, 0 to
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -356,7 +357,8 @@ def interval(
     measure
         Of the places of the scenes drawn.
     draws
-        How many; without any the interval is not known (NaN).
+        How many. Those of which the measure is NaN do not count; without any that does the
+        interval is not known (NaN).
     """
     if not draws:
         return float("nan"), float("nan")
@@ -369,7 +371,10 @@ def interval(
     for _ in range(draws):
         chosen = rng.integers(len(members), size=len(members))
         found.append(measure([place for drawn in chosen for place in members[drawn]]))
-    low, high = np.nanquantile(found, [(1 - level) / 2, (1 + level) / 2]).tolist()
+    known = [value for value in found if not math.isnan(value)]
+    if not known:
+        return float("nan"), float("nan")
+    low, high = np.quantile(known, [(1 - level) / 2, (1 + level) / 2]).tolist()
     return float(low), float(high)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import resource
 import secrets
 import socket
@@ -147,6 +148,8 @@ def serve(
             opener = threading.Timer(0.5, webbrowser.open, (page,))
             opener.daemon = True
             opener.start()
+        # What is imported stays. Each full collection stops all requests, /api/health as well.
+        gc.freeze()
         uvicorn.Server(_server_config(app)).run(sockets=[bound])
 
 

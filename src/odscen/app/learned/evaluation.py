@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -159,8 +160,11 @@ class TrafficQuality:
     values: dict[str, MeasuredValue]
 
     def to_dict(self) -> dict[str, Any]:
-        """As values that JSON can hold."""
-        values = {name: one._asdict() for name, one in self.values.items()}
+        """As values that JSON can hold, ``None`` for those that are not known."""
+        values = {
+            name: {part: None if math.isnan(number) else number for part, number in pairs}
+            for name, pairs in ((name, one._asdict().items()) for name, one in self.values.items())
+        }
         return {**asdict(self), "values": values}
 
 
