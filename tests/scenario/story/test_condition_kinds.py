@@ -82,6 +82,16 @@ def test_seconds_that_leap_as_somebody_sets_off_are_not_drawn_out_beyond_the_bou
     assert found == pytest.approx((-4.01 + math.sqrt(4.01**2 + 4 * 59.98)) / 2, abs=0.1 * step)
 
 
+def test_who_stands_has_no_headway_that_could_be_above_a_bound() -> None:
+    """As esmini has it: the rule waits until the one behind drives, and its headway is long."""
+    stands = replace(EGO, x=-104.0, speed=0.0)
+    when = {"headway": {"of": "ego", "to": "car", "above": 5.0}}
+    assert started(story([rule(when)], CAR, stands)) == []
+    starts = replace(stands, acceleration=2.0)
+    [found] = started(story([rule(when)], CAR, starts, step=0.1))
+    assert 0.0 < found <= 0.1
+
+
 def test_bodies_that_touch_and_stay_so_have_no_time_to_collision() -> None:
     beside = replace(CAR, id="ego", x=-4.0)
     assert started(story([rule({"ttc": {"to": "ego", "below": 3.0}})], CAR, beside)) == []

@@ -225,6 +225,9 @@ def _read_headway(part: PairBounded, actor: str, view: RoadView) -> Reading | No
     if (both := _pair_of_condition(part, actor, view)) is None:
         return None
     found = _measure_lengthwise(*both)
+    if part.above is not None and found.behind.speed <= _STILL:
+        # Who stands has no headway, so it is not above a bound either.
+        return Reading(math.inf, NEVER)
     return _read_seconds(part, max(found.gap, 0.0), found.behind.speed)
 
 
@@ -389,7 +392,8 @@ CONDITIONS = {
         ),
         ConditionKind(
             "headway", "time headway: gap between the bodies along the heading, over the speed of "
-            "the one behind", "s", _EXTRAPOLATED, "TimeHeadwayCondition", _MIRRORED, _read_headway,
+            "the one behind; none while that one stands", "s", _EXTRAPOLATED,
+            "TimeHeadwayCondition", _MIRRORED, _read_headway,
         ),
         ConditionKind(
             "distance", "metres to an actor (`to`) or a place (`place`): `straight`, "
