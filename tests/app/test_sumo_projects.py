@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import re
-import shutil
 import subprocess
 from collections import Counter
 from pathlib import Path
@@ -34,9 +31,6 @@ from odscen.scenario.document.sumo_document import SumoFile
 from odscen.sumo.realize.project_files import _made_harmless, allowed_options
 
 BIN = Path(sumo.SUMO_HOME) / "bin"
-PROJECTS = Path(
-    os.environ.get("ODSCEN_TEST_PROJECTS", Path(__file__).parents[3] / "shared" / "projects")
-)
 CONFIG = """<sumoConfiguration><input><net-file value="grid.net.xml"/>
 <route-files value="sub/cars.rou.xml,people.rou.xml"/><additional value="things.add.xml"/></input>
 <output><summary-output value="/tmp/summary.xml"/></output>
@@ -263,27 +257,6 @@ def test_the_run_is_that_of_sumo_alone(finished: Run, original: Original) -> Non
     assert (rows["v1"]["category"], rows["v1"]["status"]) == ("truck", "arrived")
     assert Counter(row["flow"] for row in rows.values())["f"] == 100
     assert {"p1", "p2", "bus", "t1"} <= rows.keys()
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not PROJECTS.is_dir(), reason="projects of others are not here")
-def test_acosta_runs_as_sumo_alone_with_all_its_seven_programs(
-    store: Workspace, tmp_path: Path
-) -> None:
-    folder = tmp_path / "acosta"
-    shutil.copytree(PROJECTS / "acosta", folder)
-    config = (folder / "run.sumocfg").read_text()
-    start, _, rest = config.partition("<gui_only>")
-    (folder / "plain.sumocfg").write_text(start + rest.partition("</gui_only>")[2])
-    named = re.search(r'additional-files value="(.*?)"', config)
-    assert named
-    original = run_of_sumo(
-        folder, "plain.sumocfg", *named[1].split(","), net="acosta_buslanes.net.xml"
-    )
-    made = import_file(store, folder / "run.sumocfg")
-    assert made.scenario is not None
-    assert len(original.lights) == 7
-    assert_agrees(run(store, made.scenario), original)
 
 
 def test_nothing_is_written_outside_the_run(finished: Run) -> None:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, File, Form, UploadFile
 
 from odscen.app.demand import demands
 from odscen.app.demand.traffic_files import put_traffic
-from odscen.base.errors import InputError, in_file
+from odscen.base.errors import InputError, ScenarioError, in_file
 from odscen.formats.office.read_traffic import read_traffic
 from odscen.scenario.document.document_parts import Identifier
 from odscen.scenario.document.scenario_document import Scenario
@@ -72,7 +72,8 @@ def table(
         try:
             return demands.import_text(loaded, scenario, text, kind=kind, name=part, day=day)
         except InputError as error:
-            what = _name_foreign_file(content)
+            rows_named = isinstance(error, ScenarioError)  # with our columns, values are wrong
+            what = None if rows_named else _name_foreign_file(content)
             if what is None:
                 raise
             raise InputError(
