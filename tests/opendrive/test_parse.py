@@ -103,9 +103,12 @@ REFUSED = {
     "another root": ("<net/>", "the root element is <net>"),
     "no road": (document(), "there is no <road>"),
     "version 2": (document(road(), version="2.0"), "header: OpenDRIVE 2.0 is not supported"),
-    "two roads of one id": (document(road(), road()), "road 1: there is another road"),
+    "two roads of one id": (
+        document(road(), road(plan=LINE.replace('hdg="0"', 'hdg="1"'))),
+        "road 1: there is another road",
+    ),
     "two junctions of one id": (
-        document(road(), '<junction id="5"/><junction id="5"/>'),
+        document(road(), '<junction id="5"/><junction id="5" name="other"/>'),
         "junction 5: there is another junction",
     ),
     "not a number": (
@@ -166,7 +169,7 @@ REFUSED = {
         "road 1 > geometry 0: ends 40 m away from the start of the next",
     ),
     "geometry backwards": (
-        document(road(plan=LINE + LINE)),
+        document(road(plan=LINE + LINE.replace('hdg="0"', 'hdg="1"'))),
         "road 1 > geometry 1: s=0 is not beyond the s=0 of the geometry before",
     ),
     "an arc that winds up": (
@@ -182,7 +185,7 @@ REFUSED = {
         "laneSection 1: s=200 is beyond the road's length of 100",
     ),
     "one lane twice": (
-        document(road(lanes=section(lane(-1), lane(-1)))),
+        document(road(lanes=section(lane(-1), lane(-1, kind="biking")))),
         "road 1 > laneSection 0: there are two lanes with the id -1",
     ),
     "a lane on the wrong side": (

@@ -85,7 +85,9 @@ def test_python_runs_it_and_reads_records_and_figures(
     assert counts["planned"] == counts["inserted"] > 3
     assert run.summary["insertion_error_max"] < 0.5, "it leaves out lateral offsets"
     table = run.trajectories()
-    assert set(table["speed"]) == {8.0}
+    # What is read is the speed of positions, which it takes from nodes two metres apart.
+    assert table["speed"].median() == pytest.approx(8.0, abs=0.05)
+    assert table["speed"].max() < 8.2
     steps = table.sort("id", "time").group_by("id", maintain_order=True)
     for _, rows in steps:
         moved = np.hypot(np.diff(rows["x"].to_numpy()), np.diff(rows["y"].to_numpy()))

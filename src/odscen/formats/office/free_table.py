@@ -138,7 +138,10 @@ def table_of_text(text: str) -> GivenTable:
         raise InputError("the file is empty")
 
     def evenness(separator: str) -> tuple[int, int]:
-        widths = Counter(len(row) for row in csv.reader(sample, delimiter=separator))
+        try:
+            widths = Counter(len(row) for row in csv.reader(sample, delimiter=separator))
+        except csv.Error:  # a cell without end: the reader below says in which line
+            return 0, 0
         width, rows = max(widths.items(), key=lambda found: (found[1] * (found[0] > 1), found[0]))
         return (rows if width > 1 else 0), width
 

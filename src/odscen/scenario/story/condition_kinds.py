@@ -226,7 +226,7 @@ def _read_headway(part: PairBounded, actor: str, view: RoadView) -> Reading | No
         return None
     found = _measure_lengthwise(*both)
     if part.above is not None and found.behind.speed <= _STILL:
-        # Who stands has no headway, so it is not above a bound either.
+        # A stopped vehicle has no headway, so it is not above a bound either.
         return Reading(math.inf, NEVER)
     return _read_seconds(part, max(found.gap, 0.0), found.behind.speed)
 
@@ -392,7 +392,7 @@ CONDITIONS = {
         ),
         ConditionKind(
             "headway", "time headway: gap between the bodies along the heading, over the speed of "
-            "the one behind; none while that one stands", "s", _EXTRAPOLATED,
+            "the one behind; none while it is stopped", "s", _EXTRAPOLATED,
             "TimeHeadwayCondition", _MIRRORED, _read_headway,
         ),
         ConditionKind(
