@@ -82,7 +82,8 @@ def _is_left(kind: str, name: str) -> bool:
     """Whether nothing is computed from a file: docs/strangers.md lists these."""
     if name.endswith(PASSING):
         return True
-    if kind == "interrupted run" and name == "sumo.log":
+    # Killed as it ended, a run has a summary, which resuming removes before it goes on.
+    if kind == "interrupted run" and name in ("sumo.log", "summary.json"):
         return True
     return kind in ("study", "sweep") and name.endswith(".html")
 
