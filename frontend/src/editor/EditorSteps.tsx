@@ -300,7 +300,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
               lights={lights}
               blocked={errors > 0}
               busy={run.busy}
-              empty={ones.length === 0 && !bringsTraffic(demand)}
+              empty={ones.length === 0 && !bringsTraffic(demand) && !document.sumo}
               onEdit={changes.change}
               onRun={run.start}
               onLights={() => {
