@@ -188,7 +188,7 @@ def _check_run(store: Workspace, run: Path, *, as_json: bool) -> int:
         print_json(report)
     else:
         keys = ("kind", "category", "cause", "findings", "users", "value", "unit", "bound")
-        rows = [tuple(_rounded(row[key]) for key in keys) for row in report["counts"]]
+        rows = [tuple(_format_rounded(row[key]) for key in keys) for row in report["counts"]]
         print_table("", keys, rows)
         for row in report["findings"]:
             if row["counted"]:
@@ -208,7 +208,7 @@ def _check_run(store: Workspace, run: Path, *, as_json: bool) -> int:
     return 1 if report["implausible"] else 0
 
 
-def _rounded(value: object) -> object:
+def _format_rounded(value: object) -> object:
     return round(value, 2) if isinstance(value, float) else value
 
 

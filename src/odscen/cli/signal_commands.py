@@ -239,7 +239,7 @@ def log_measures(
         print_json({name: _rows_as_json(table) for name, table in found.items()})
     for name, table in found.items():
         if not as_json and name != "arrivals":
-            rows = [[_cell(value) for value in row] for row in table.rows()]
+            rows = [[_format_cell(value) for value in row] for row in table.rows()]
             print_table(name.replace("_", " "), table.columns, rows)
         if out is not None:
             log(f"wrote {write_text(out / f'{name}.csv', table.write_csv())}")
@@ -251,7 +251,7 @@ def _rows_as_json(table: pl.DataFrame) -> list[dict[str, Any]]:
     return table.with_columns(cs.datetime().dt.to_string("%Y-%m-%dT%H:%M:%S%.3f")).to_dicts()
 
 
-def _cell(value: object) -> str:
+def _format_cell(value: object) -> str:
     return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
@@ -327,7 +327,9 @@ def webster(
         bounds=(shortest, longest),
     )
     tried = (
-        _evaluate(store, timed.scenario, today=scenario, seeds=seeds, jobs=jobs) if trial else None
+        _evaluate_sides(store, timed.scenario, today=scenario, seeds=seeds, jobs=jobs)
+        if trial
+        else None
     )
     _refuse_worse(tried, anyway=anyway)
     path = scenarios.write_scenario(timed.scenario, out or scenario)
@@ -398,7 +400,9 @@ def coordinate(
     if not (found.worth_it or anyway):
         raise InputError(f"{' '.join(found.doubts)} With --anyway it is written all the same")
     tried = (
-        _evaluate(store, found.scenario, today=scenario, seeds=seeds, jobs=jobs) if trial else None
+        _evaluate_sides(store, found.scenario, today=scenario, seeds=seeds, jobs=jobs)
+        if trial
+        else None
     )
     _refuse_worse(tried, anyway=anyway)
     path = scenarios.write_scenario(found.scenario, out or scenario)
@@ -447,7 +451,9 @@ def evaluate(
     """
     from odscen.maps.store import Workspace
 
-    found = _evaluate(Workspace.open(workspace), scenario, today=today, seeds=seeds, jobs=jobs)
+    found = _evaluate_sides(
+        Workspace.open(workspace), scenario, today=today, seeds=seeds, jobs=jobs
+    )
     if as_json:
         print_json(found.to_dict())
         return
@@ -464,7 +470,7 @@ def evaluate(
     log(found.words)
 
 
-def _evaluate(
+def _evaluate_sides(
     store: Workspace, scenario: Scenario | Path, *, today: Path | None, seeds: Any, jobs: int
 ) -> SignalEvaluation:
     """Run both sides, with a bar."""

@@ -74,7 +74,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     InputError
         If a file is missing, is no XML, or the network no SUMO network; names file and element.
     """
-    content = _unpacked(source.file.read())
+    content = _unpack_content(source.file.read())
     with in_file(source.file.where):
         root = read_xml(content, huge=True)
     report = ElementReport(source.file.name)
@@ -98,7 +98,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     ]
     net_file = source.file.other(net_name)
     programs = _take_programs(files, report)
-    on_map = _bring_network(source, net_file, _unpacked(net_file.read()), programs, report)
+    on_map = _bring_network(source, net_file, _unpack_content(net_file.read()), programs, report)
     begin = seconds_of(options.get("begin")) or 0.0
     seed = int(float(options.get("seed") or SUMO_SEED))
     scenario = _empty_scenario(source, on_map, max(0, min(seed, 2**31 - 1)), report)
@@ -110,7 +110,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     scenario = scenario.model_copy(
         update={
             "sumo": project,
-            "simulation": _simulation(options, files, report, begin=begin),
+            "simulation": _read_simulation(options, files, report, begin=begin),
         }
     )
     if begin:
@@ -123,7 +123,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     return FileContent(scenario, lists=report.lists)
 
 
-def _unpacked(content: bytes) -> bytes:
+def _unpack_content(content: bytes) -> bytes:
     if not content.startswith(b"\x1f\x8b"):
         return content
     try:
@@ -164,7 +164,7 @@ def _read_files(
         if not named:
             continue
         given = source.file.other(named)
-        content = _unpacked(given.read())
+        content = _unpack_content(given.read())
         with in_file(given.where):
             root = read_xml(content, huge=True)
             changed = _embed_includes(root, given, 0)
@@ -188,7 +188,7 @@ def _embed_includes(root: etree._Element, file: GivenFile, depth: int) -> bool:
             raise InputError("files include each other without an end", element=str(element.tag))
         other = file.other(named)
         with in_file(other.where):
-            inner = read_xml(_unpacked(other.read()), huge=True)
+            inner = read_xml(_unpack_content(other.read()), huge=True)
             _embed_includes(inner, other, depth + 1)
         changed = True
         parent = element.getparent()
@@ -233,7 +233,7 @@ def _take_programs(files: list[_ReadFile], report: ElementReport) -> list[etree.
                 "taken",
                 label,
                 f"{phases} phases, cycle {cycle:g} s: the program in force of the map's network",
-                line=_line(logic),
+                line=_line_of(logic),
             )
             file.root.remove(logic)
             found.append(logic)
@@ -242,7 +242,7 @@ def _take_programs(files: list[_ReadFile], report: ElementReport) -> list[etree.
     return found
 
 
-def _line(element: etree._Element) -> int:
+def _line_of(element: etree._Element) -> int:
     line = element.sourceline
     return line if isinstance(line, int) else 0
 
@@ -324,7 +324,7 @@ def _empty_scenario(
     )
 
 
-def _simulation(
+def _read_simulation(
     options: Mapping[str, str], files: Sequence[_ReadFile], report: ElementReport, *, begin: float
 ) -> Simulation:
     end = seconds_of(options.get("end"))
@@ -399,7 +399,7 @@ def _with_zones(
             inside = tuple(segment for segment in segments if segment in roi)
             if inside and name:
                 parts[name] = {"segments": inside}
-                report.add("taken", f"taz {taz.get('id')}", f"zone {name}", line=_line(taz))
+                report.add("taken", f"taz {taz.get('id')}", f"zone {name}", line=_line_of(taz))
     return put_parts(scenario, graph, "zones", parts) if parts else scenario
 
 
@@ -419,7 +419,7 @@ def _with_detectors(
                     "ignored",
                     f"{loop.tag} {loop.get('id')}",
                     f"no lane of the map is under {shown(lane)}; SUMO has it all the same",
-                    line=_line(loop),
+                    line=_line_of(loop),
                 )
                 continue
             if pos < 0:
@@ -427,7 +427,7 @@ def _with_detectors(
             node = int(nodes[int(np.argmin(np.abs(places.pos[nodes] - pos)))])
             found[name] = {"id": name, "nodes": (str(node_id(sumo_map.graph, node)),)}
             reason = f"detector {name} of the study"
-            report.add("taken", f"{loop.tag} {loop.get('id')}", reason, line=_line(loop))
+            report.add("taken", f"{loop.tag} {loop.get('id')}", reason, line=_line_of(loop))
     if not found:
         return scenario
     return edits.set_study(scenario, sumo_map.graph, detectors=list(found.values()))

@@ -250,7 +250,7 @@ def _write_border(
     points = table.lane_points(lanes, s, at=1.0 if border == lane_id else 0.0)
     line = np.stack([points.x, points.y, points.z], axis=1)
     kept = shapely.get_coordinates(shapely.LineString(line[:, :2]).simplify(CHORD))
-    where = np.searchsorted(_run(line), _run_of(line, kept)).clip(0, len(line) - 1)
+    where = np.searchsorted(_arc_lengths(line), _run_of(line, kept)).clip(0, len(line) - 1)
     where[0], where[-1] = 0, len(line) - 1
     indices = [writer.node(line[k]) for k in dict.fromkeys(where.tolist())]
     # The part before it in the same section ends where this one begins.
@@ -261,13 +261,13 @@ def _write_border(
     return writer.way(indices, **_mark_tags(mark))
 
 
-def _run(line: FloatArray) -> FloatArray:
+def _arc_lengths(line: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))])
 
 
 def _run_of(line: FloatArray, kept: FloatArray) -> FloatArray:
     """Arc length in a line of points that are among its own, in order."""
-    run = _run(line)
+    run = _arc_lengths(line)
     places = []
     k = 0
     for point in kept:
@@ -529,7 +529,7 @@ def _write_priorities(writer: _Writer) -> None:
 # ----------------------------------------------------------------------------- file
 def _write_xml(writer: _Writer, origin: str) -> bytes:
     used = sorted({writer.root(n) for nodes, _ in writer.ways for n in nodes})
-    degrees = _degrees(writer, np.array([writer.nodes[k][:2] for k in used]), origin)
+    degrees = _degrees_of(writer, np.array([writer.nodes[k][:2] for k in used]), origin)
     root = etree.Element("osm", version="0.6", generator="odscen")
     node_ids = {index: str(k + 1) for k, index in enumerate(used)}
     first_way = len(used) + 1
@@ -565,7 +565,7 @@ def _write_tags(element: etree._Element, tags: Mapping[str, str]) -> None:
         etree.SubElement(element, "tag", k=key, v=value)
 
 
-def _degrees(writer: _Writer, points: FloatArray, origin: str) -> FloatArray:
+def _degrees_of(writer: _Writer, points: FloatArray, origin: str) -> FloatArray:
     """Latitude and longitude of points of the map; of one without a projection by the origin."""
     from pyproj import Transformer
 

@@ -79,7 +79,7 @@ class StationFinder:
         roads = self._roads_by_name.get(name.casefold(), ())
         if len(roads) == 1:
             node = self._middle_of_segment(roads[0])
-            found = self._directed(node)
+            found = self._place_by_direction(node)
             return found._replace(note=f"found by the name of the road, in segment {roads[0]}")
         if roads:
             raise InputError(
@@ -101,7 +101,7 @@ class StationFinder:
                 if known
                 else f"the map's SUMO network has no edge {shown(edge)}"
             )
-        return self._directed(self._node_at(nodes, pos))._replace(edge=edge)
+        return self._place_by_direction(self._node_at(nodes, pos))._replace(edge=edge)
 
     def of_lane(self, lane: str, pos: float | None = None) -> MapPlace:
         """Find a place on a SUMO lane."""
@@ -113,7 +113,9 @@ class StationFinder:
             return self.of_edge(known.edge, pos)._replace(lane=lane)
         if pos is not None and pos < 0:
             pos += known.length
-        return self._directed(self._node_at(rows, pos))._replace(edge=known.edge, lane=lane)
+        return self._place_by_direction(self._node_at(rows, pos))._replace(
+            edge=known.edge, lane=lane
+        )
 
     def lanes_of_edge(self, edge: str) -> int:
         """How many lanes for vehicles an edge has."""
@@ -142,7 +144,7 @@ class StationFinder:
             node = queue.popleft()
             if node in goal:
                 return self._segments_of_path(node, before)
-            for other in self._successors(node):
+            for other in self._find_successors(node):
                 if other not in before:
                     before[other] = node
                     queue.append(other)
@@ -212,7 +214,7 @@ class StationFinder:
         x, y = point
         if degrees:
             lon, lat = (np.array([value]) for value in point)
-            east, north = self._project(lon, lat)
+            east, north = self._project_station(lon, lat)
             x, y = float(east[0]), float(north[0])
         away = np.hypot(self._lanes.x - x, self._lanes.y - y)
         near = away <= NEAR
@@ -232,13 +234,13 @@ class StationFinder:
                 f"is {distance}"
             )
         node = int(np.flatnonzero(near)[int(np.argmin(away[near]))])
-        found = self._directed(node)
+        found = self._place_by_direction(node)
         if bearing is None and PLACE_SEPARATOR in found.place:
             found = found._replace(note="no direction given: that of the nearest lane was taken")
         return found
 
     @cached_property
-    def _project(self) -> Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    def _project_station(self) -> Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
         entry = self._loaded.entry
         return projection(parse(entry.read("xodr"), file=entry.path("xodr").name).header)
 
@@ -261,14 +263,14 @@ class StationFinder:
         starts = np.searchsorted(target[order], np.arange(len(graph.x) + 1))
         return source[order].astype(np.int32), starts.astype(np.int32)
 
-    def _successors(self, node: int) -> list[int]:
+    def _find_successors(self, node: int) -> list[int]:
         targets, starts = self._edges_ahead
         return [int(other) for other in targets[starts[node] : starts[node + 1]]]
 
     def _last_nodes(self, nodes: Int32Array) -> list[int]:
         """Nodes of an edge behind which another edge comes."""
         own = set(nodes.tolist())
-        ends = [n for n in sorted(own) if any(m not in own for m in self._successors(n))]
+        ends = [n for n in sorted(own) if any(m not in own for m in self._find_successors(n))]
         return ends or sorted(own)
 
     def _segments_of_path(self, node: int, before: dict[int, int]) -> str:
@@ -290,7 +292,7 @@ class StationFinder:
         same: Int32Array = near[turned <= math.pi / 2].astype(np.int32)
         return same
 
-    def _directed(self, node: int) -> MapPlace:
+    def _place_by_direction(self, node: int) -> MapPlace:
         """Place of those who pass a node in the direction of its lane.
 
         The segment alone where all of its lanes lead one way; with the one behind or before it

@@ -246,11 +246,13 @@ def _start_at_first(scenario: Scenario, read: TrafficFile, report: TrafficReport
     first = min(begins)
     if not 0 < first < 86_400:
         return scenario
-    report.notes.append(f"the run now starts at {_clock(first)}, when the first count begins")
+    report.notes.append(
+        f"the run now starts at {_format_clock(first)}, when the first count begins"
+    )
     return edits.set_clock(scenario, clock=first)
 
 
-def _clock(seconds: float) -> str:
+def _format_clock(seconds: float) -> str:
     minutes = round(seconds) // 60
     return f"{minutes // 60:02d}:{minutes % 60:02d}"
 
@@ -333,13 +335,15 @@ def _put_trips(
         window = _window_of_matrix(begin, end, clock if read.of_day else 0.0)
         if window is None:
             reason = f"{len(trips)} rows are of a time before the run starts"
-            report.left_out.append((f"{_clock(begin or 0)} to {_clock(end or 0)}", reason))
+            report.left_out.append(
+                (f"{_format_clock(begin or 0)} to {_format_clock(end or 0)}", reason)
+            )
             continue
         first, last, share = window
         if share < 1.0:
             report.notes.append(
-                f"of the trips from {_clock(begin or 0)} to {_clock(end or 0)} the {share:.0%} "
-                "after the start of the run were taken"
+                f"of the trips from {_format_clock(begin or 0)} to {_format_clock(end or 0)} "
+                f"the {share:.0%} after the start of the run were taken"
             )
         added: dict[tuple[str, str], float] = defaultdict(float)
         for origin, destination, count in trips:
@@ -437,7 +441,10 @@ class _VolumeWriter:
             slot[row.station] = row
         if early:
             report.left_out.append(
-                (f"{early} rows", f"they are of times before {_clock(clock)}, the start of the run")
+                (
+                    f"{early} rows",
+                    f"they are of times before {_format_clock(clock)}, the start of the run",
+                )
             )
         counts: list[tuple[str, float, float, float]] = []
         shared: dict[tuple[str, ...], str] = {}
@@ -507,7 +514,9 @@ class _VolumeWriter:
             counts.remove(row)
             self._report.taken -= 1
             reason = f"{row[0]}: its slice has {row[2] - row[1]:g} s, most have {usual:g}"
-            self._report.left_out.append((_clock(row[1] + self._scenario.demand.clock), reason))
+            self._report.left_out.append(
+                (_format_clock(row[1] + self._scenario.demand.clock), reason)
+            )
 
     def _judge_counts(self, counts: Iterable[tuple[str, float, float, float]]) -> None:
         """Look for jumps, zeros, equal values, gaps, and more than a road carries."""
@@ -523,8 +532,9 @@ class _VolumeWriter:
             for begin, end, number in slices:
                 if number * 3600.0 / (end - begin) > capacity:
                     doubts.append(
-                        f"{place} at {_clock(begin + clock)}: {number * 3600 / (end - begin):,.0f} "
-                        f"vehicles an hour, where {capacity:,.0f} can pass"
+                        f"{place} at {_format_clock(begin + clock)}: "
+                        f"{number * 3600 / (end - begin):,.0f} vehicles an hour, "
+                        f"where {capacity:,.0f} can pass"
                     )
             for index in range(1, len(slices) - 1):
                 before, here, after = numbers[index - 1 : index + 2]
@@ -533,10 +543,10 @@ class _VolumeWriter:
                 down = _JUMP * here < low and low - here >= _LEAST_JUMP
                 if up or down:
                     doubts.append(
-                        f"{place} at {_clock(slices[index][0] + clock)}: {here:g} vehicles between "
-                        f"{before:g} and {after:g}"
+                        f"{place} at {_format_clock(slices[index][0] + clock)}: "
+                        f"{here:g} vehicles between {before:g} and {after:g}"
                     )
-            doubts += _runs(place, numbers)
+            doubts += _doubt_equal_values(place, numbers)
             gaps = [
                 after[0] - before[1] for before, after in pairwise(slices) if after[0] > before[1]
             ]
@@ -544,7 +554,7 @@ class _VolumeWriter:
                 doubts.append(f"{place}: {len(gaps)} gaps, {sum(gaps) / 60:g} min in all")
 
 
-def _runs(place: str, numbers: list[float]) -> list[str]:
+def _doubt_equal_values(place: str, numbers: list[float]) -> list[str]:
     """Doubts about equal values in a row."""
     found = []
     begin = 0

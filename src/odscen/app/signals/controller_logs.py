@@ -118,7 +118,7 @@ def play_controller_log(
         last = (events["time"][-1] - start).total_seconds()
         if last <= 0:
             raise InputError(f"the log ends before {start:%Y-%m-%d %H:%M:%S}")
-    notes += _silences(events)
+    notes += _find_silences(events)
     if last < scenario.simulation.duration:
         notes.append(
             f"the log ends {last:.0f} s after the run begins, which lasts "
@@ -272,7 +272,7 @@ def _changes_of_channel(
     return found
 
 
-def _silences(events: pl.DataFrame) -> list[str]:
+def _find_silences(events: pl.DataFrame) -> list[str]:
     return [
         f"no event from {before:%H:%M:%S} to {after:%H:%M:%S}: the light stays as it was"
         for before, after in pairwise(events["time"].unique(maintain_order=True))

@@ -157,7 +157,7 @@ def evaluate_signals(
             processes=processes, reports=False, reporter=reporter,
         )  # fmt: skip
         before, after = (
-            {seed: _figures(run) for seed, run in zip(seeds, half, strict=True)}
+            {seed: _read_figures(run) for seed, run in zip(seeds, half, strict=True)}
             for half in (runs[: len(seeds)], runs[len(seeds) :])
         )
     differences = {
@@ -184,7 +184,7 @@ def _lights_of(new: Scenario, today: Scenario) -> Any:
     return today.signals
 
 
-def _figures(run: Run) -> dict[str, float | None]:
+def _read_figures(run: Run) -> dict[str, float | None]:
     if run.status != RunStatus.COMPLETED:
         raise InputError(f"a run with seed {run.summary['seed']} has not completed: {run.status}")
     counts, figures = run.summary["actors"], run.summary["figures"]

@@ -51,10 +51,10 @@ def arrivals(events: pl.DataFrame, detectors: pl.DataFrame) -> pl.DataFrame:
 
     rows = []
     words = {GREEN: "green", YELLOW: "yellow", RED: "red"}
-    for device, phase, own, lights in _phases(events, detectors, "advance"):
+    for device, phase, own, lights in _find_phases(events, detectors, "advance"):
         calls = own.filter(pl.col("event") == DETECTOR_ON)
-        times, codes = _seconds(lights), lights["event"].to_numpy()
-        at = _seconds(calls)
+        times, codes = _epoch_seconds(lights), lights["event"].to_numpy()
+        at = _epoch_seconds(calls)
         last = np.searchsorted(times, at, side="right") - 1
         greens = times[codes == GREEN]
         begun = np.searchsorted(greens, at, side="right") - 1
@@ -110,13 +110,13 @@ def split_failures(
 
     rows = []
     bins = events.select(pl.col("time").dt.truncate(f"{minutes}m"))
-    cut = (_seconds(bins).max() if len(bins) else 0.0) + 60.0 * minutes
-    for device, phase, own, lights in _phases(events, detectors, "presence"):
+    cut = (_epoch_seconds(bins).max() if len(bins) else 0.0) + 60.0 * minutes
+    for device, phase, own, lights in _find_phases(events, detectors, "presence"):
         spans = _occupied_spans(own)
         if spans is None:
             continue
         known, begins, ends = spans
-        times, codes = _seconds(lights), lights["event"].to_numpy()
+        times, codes = _epoch_seconds(lights), lights["event"].to_numpy()
         greens = np.flatnonzero(codes == GREEN)
         limits = [*times[greens].tolist()[1:], np.inf]
         for green, limit in zip(times[greens].tolist(), limits, strict=True):
@@ -126,8 +126,10 @@ def split_failures(
             over = [red + RED_SECONDS for red in reds if red + RED_SECONDS < min(limit, cut)]
             if len(yellows) != 1 or len(over) != 1 or len(reds) != 1 or known > green:
                 continue
-            busy = _overlap(begins, ends, green, float(yellows[0])) / (float(yellows[0]) - green)
-            late = _overlap(begins, ends, float(reds[0]), over[0]) / RED_SECONDS
+            busy = _measure_overlap(begins, ends, green, float(yellows[0])) / (
+                float(yellows[0]) - green
+            )
+            late = _measure_overlap(begins, ends, float(reds[0]), over[0]) / RED_SECONDS
             failed = busy >= OCCUPIED and late >= OCCUPIED
             rows.append((device, phase, over[0], float(yellows[0]) - green, busy, late, failed))
     schema = {
@@ -185,11 +187,11 @@ def pedestrian_delays(events: pl.DataFrame, *, minutes: int = 15) -> pl.DataFram
     )
 
 
-def _seconds(events: pl.DataFrame) -> FloatArray:
+def _epoch_seconds(events: pl.DataFrame) -> FloatArray:
     return events["time"].dt.epoch("ms").to_numpy() / 1000.0
 
 
-def _phases(
+def _find_phases(
     events: pl.DataFrame, detectors: pl.DataFrame, function: str
 ) -> Iterator[tuple[str, int, pl.DataFrame, pl.DataFrame]]:
     """Each phase with calls of its detectors, and with its begins of green, yellow and red."""
@@ -216,7 +218,7 @@ def _occupied_spans(calls: pl.DataFrame) -> tuple[float, FloatArray, FloatArray]
     """
     steps: list[tuple[float, int]] = []
     for _, own in calls.group_by("parameter", maintain_order=True):
-        times, codes = _seconds(own), own["event"].to_numpy()
+        times, codes = _epoch_seconds(own), own["event"].to_numpy()
         for index, (time, code) in enumerate(zip(times.tolist(), codes.tolist(), strict=True)):
             change = 1 if code == DETECTOR_ON else -1
             if index == 0 and change < 0:
@@ -246,6 +248,6 @@ def _occupied_spans(calls: pl.DataFrame) -> tuple[float, FloatArray, FloatArray]
     return steps[0][0], np.array(begins), np.array(ends)
 
 
-def _overlap(begins: FloatArray, ends: FloatArray, start: float, end: float) -> float:
+def _measure_overlap(begins: FloatArray, ends: FloatArray, start: float, end: float) -> float:
     """Seconds of spans within ``start`` and ``end``."""
     return float(np.clip(np.minimum(ends, end) - np.maximum(begins, start), 0.0, None).sum())

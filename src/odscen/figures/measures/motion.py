@@ -280,7 +280,7 @@ def _check_part(
     if lanes is not None:
         recorded = rows["lane"] if "lane" in rows.columns else None
         steps += _off_road(time, x, y, speed, walking, recorded, lanes, step)
-    steps += _overlaps(time, row, x, y, hdg, length, width, step)
+    steps += _find_overlaps(time, row, x, y, hdg, length, width, step)
     return _join_findings(steps, rows, plan, forced, lanes, step)
 
 
@@ -389,7 +389,7 @@ def _check_steps(
     change_y = (y[last] - y[mid]) / two - (y[mid] - y[first]) / one
     span = 0.5 * (one + two)
     sideways = np.abs(change_y * np.cos(hdg[mid]) - change_x * np.sin(hdg[mid])) / span
-    jumps = np.concatenate(([0], np.cumsum(_flags(jumped, later, len(time)))))
+    jumps = np.concatenate(([0], np.cumsum(_flag_rows(jumped, later, len(time)))))
     whole = jumps[last + 1] == jumps[first + 1]
     bound = limits[1, mid]
     at = np.flatnonzero(whole & (sideways > bound + 0.1))
@@ -403,13 +403,13 @@ def _check_steps(
     return found
 
 
-def _flags(mask: BoolArray, rows: IntArray, count: int) -> IntArray:
+def _flag_rows(mask: BoolArray, rows: IntArray, count: int) -> IntArray:
     flags = np.zeros(count, dtype=np.int64)
     flags[rows[mask]] = 1
     return flags
 
 
-def _sampled(time: FloatArray, step: float) -> BoolArray:
+def _sample_rows(time: FloatArray, step: float) -> BoolArray:
     """Rows at which overlaps and lanes are looked at: one record in so many."""
     every = max(1, round(SAMPLED / step))
     number = np.rint(time / step).astype(np.int64)
@@ -430,7 +430,7 @@ def _off_road(
     """Vehicles under way whose centre is beyond the border of every lane."""
     import shapely
 
-    rows = np.flatnonzero(_sampled(time, step) & ~walking & (speed > 0.5))
+    rows = np.flatnonzero(_sample_rows(time, step) & ~walking & (speed > 0.5))
     if not len(rows) or not len(lanes.lines):
         return []
     lines = np.array([shapely.LineString(line) for line in lanes.lines])
@@ -461,7 +461,7 @@ def _off_road(
     return [_Step(MotionKind.OFF_ROAD, rows[at], values, np.full(len(at), OFF_LANE))]
 
 
-def _overlaps(
+def _find_overlaps(
     time: FloatArray,
     row: IntArray,
     x: FloatArray,
@@ -474,7 +474,7 @@ def _overlaps(
     """Pairs of bodies that overlap at the same time by more than :data:`TOUCHING`."""
     from scipy.spatial import cKDTree
 
-    rows = np.flatnonzero(_sampled(time, step))
+    rows = np.flatnonzero(_sample_rows(time, step))
     if len(rows) < 2:
         return []
     # Pairs whose centres are near: of short bodies all at once, of long ones each with all.

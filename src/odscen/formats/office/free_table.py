@@ -349,11 +349,13 @@ class FreeTable:
                 if sums or not end or normalised(end) in ("sum", "summe", "total", "gesamt"):
                     continue
                 total += 1
-                value = self._value(cell, line, f"{row[0]} to {end}")
+                value = self._read_value(cell, line, f"{row[0]} to {end}")
                 if value:
                     trips.append(TripRow(row[0], end, value, None, None, line))
         zones = {row.origin for row in trips} | {row.destination for row in trips}
-        return self._file(f"a square matrix with {len(zones)} zones", total, trips=tuple(trips))
+        return self._make_file(
+            f"a square matrix with {len(zones)} zones", total, trips=tuple(trips)
+        )
 
     def _read_pairs(self) -> TrafficFile:
         stamps = self._stamp_reader("time") if "time" in self._index else None
@@ -366,7 +368,7 @@ class FreeTable:
                 self._leave_out(line, "no origin or destination")
                 continue
             zones |= dict.fromkeys((origin, destination))
-            value = self._value(row[self._index["trips"]], line, f"{origin} to {destination}")
+            value = self._read_value(row[self._index["trips"]], line, f"{origin} to {destination}")
             begin = end = None
             if stamps is not None and "end" in self._index:
                 first = stamps.read(row[self._index["time"]])
@@ -375,7 +377,7 @@ class FreeTable:
             if value:
                 trips.append(TripRow(origin, destination, value, begin, end, line))
         what = f"a matrix in rows with {len(zones)} zones"
-        return self._file(what, len(self._table.rows), trips=tuple(trips), of_day=of_day)
+        return self._make_file(what, len(self._table.rows), trips=tuple(trips), of_day=of_day)
 
     # ------------------------------------------------------------------ counts
 
@@ -418,14 +420,16 @@ class FreeTable:
             for column in slices:
                 stamp = stamps[column]
                 cell = row[column]
-                value = self._value(cell, line, f"{station} at {self._table.titles[column]}")
+                value = self._read_value(cell, line, f"{station} at {self._table.titles[column]}")
                 if value is not None:
                     end = stamp.end or stamp.second + length
                     rows.append(VolumeRow(station, stamp.second, end, value, line))
         self.columns["time"] = f"{self._table.titles[slices[0]]} ... ({len(slices)} columns)"
         what = f"counts of {len(stations)} stations with a column for each of {len(slices)} slices"
         total = len(self._table.rows) * len(slices)
-        return self._file(what, total, volumes=tuple(rows), stations=_placed(stations), of_day=True)
+        return self._make_file(
+            what, total, volumes=tuple(rows), stations=_stations_with_place(stations), of_day=True
+        )
 
     def _chosen_date(self) -> str | None:
         """Text of the day that is taken of a table with a day in each row."""
@@ -527,7 +531,7 @@ class FreeTable:
                 self._leave_out(line, str(error))
                 continue
             stations.setdefault(station, self._station_place(row, line))
-            values = [self._value(row[column], line, station) for column in columns]
+            values = [self._read_value(row[column], line, station) for column in columns]
             known = [value for value in values if value is not None]
             if known:
                 read.append((station, stamp, end, sum(known), line))
@@ -559,11 +563,11 @@ class FreeTable:
         if rate:
             self._notes.append("vehicles per hour were turned into vehicles of the slice")
         what = f"counts of {len({row.station for row in volumes})} stations in rows"
-        return self._file(
+        return self._make_file(
             what,
             len(table.rows),
             volumes=tuple(volumes),
-            stations=_placed(stations),
+            stations=_stations_with_place(stations),
             of_day=any(stamp.of_day for _, stamp, *_ in kept),
         )
 
@@ -597,7 +601,7 @@ class FreeTable:
                 self._leave_out(line, str(error))
                 continue
             for column in numeric:
-                value = self._value(row[column], line, table.titles[column])
+                value = self._read_value(row[column], line, table.titles[column])
                 if value is not None:
                     read.append((table.titles[column], stamp, stamp.end, value, line))
         kept = self._one_day(read)
@@ -609,7 +613,7 @@ class FreeTable:
             for name, stamp, end, value, line in kept
         )
         self.columns["count"] = f"{table.titles[numeric[0]]} ... ({len(numeric)} columns)"
-        return self._file(
+        return self._make_file(
             f"counts with a column for each of {len(numeric)} stations",
             len(table.rows) * len(numeric),
             volumes=volumes,
@@ -623,31 +627,31 @@ class FreeTable:
             place = self._station_place(row, line)
             if not name:
                 self._leave_out(line, "no station")
-            elif not _placed({name: place}):
+            elif not _stations_with_place({name: place}):
                 self._leave_out(line, f"{name}: no place")
             else:
                 stations[name] = place
         what = f"a table of {len(stations)} places of stations"
-        return self._file(what, len(self._table.rows), stations=stations)
+        return self._make_file(what, len(self._table.rows), stations=stations)
 
     # ------------------------------------------------------------------ cells
 
     def _is_numeric(self, column: int) -> bool:
         cells = [row[column] for row in self._table.rows[:50] if not is_missing(row[column])]
         try:
-            return bool(cells) and all(self._parse(cell) >= 0 for cell in cells)
+            return bool(cells) and all(self._parse_number(cell) >= 0 for cell in cells)
         except InputError:
             return False
 
-    def _parse(self, cell: str) -> float:
+    def _parse_number(self, cell: str) -> float:
         return parse_number(cell, decimal_comma=self._comma)
 
-    def _value(self, cell: str, line: int, what: str) -> float | None:
+    def _read_value(self, cell: str, line: int, what: str) -> float | None:
         if is_missing(cell):
             self._leave_out(line, f"{what}: no value")
             return None
         try:
-            value = self._parse(cell)
+            value = self._parse_number(cell)
         except InputError as error:
             self._leave_out(line, f"{what}: {error}")
             return None
@@ -763,7 +767,7 @@ class FreeTable:
             point = (x, y)
         return StationPlace(word("edge"), word("lane"), number("pos"), point, degrees, bearing)
 
-    def _file(
+    def _make_file(
         self,
         what: str,
         rows: int,
@@ -787,7 +791,7 @@ class FreeTable:
         )
 
 
-def _placed(stations: Mapping[str, StationPlace]) -> dict[str, StationPlace]:
+def _stations_with_place(stations: Mapping[str, StationPlace]) -> dict[str, StationPlace]:
     """Stations of which the table says where they are."""
     return {
         name: place

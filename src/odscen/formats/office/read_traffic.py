@@ -65,7 +65,7 @@ def _read_any(
     if not content.strip():
         raise InputError("the file is empty")
     if content.startswith(b"\x1f\x8b"):
-        content = _unpacked(content)
+        content = _unpack_content(content)
     if content.startswith((b"PK\x03\x04", _OLE)):
         return _read_table(table_of_sheet(content), options, known_columns)
     if content.startswith(b"BI") and b"\x00" in content[:64]:
@@ -99,7 +99,7 @@ def _read_table(
     return FreeTable(table, options).read()
 
 
-def _unpacked(content: bytes) -> bytes:
+def _unpack_content(content: bytes) -> bytes:
     try:
         found = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16).decompress(content, MOST + 1)
     except (zlib.error, gzip.BadGzipFile, EOFError) as error:

@@ -60,7 +60,7 @@ def read_sumo_traffic(root: etree._Element, *, attribute: str | None = None) -> 
     return reader.file(root)
 
 
-def _line(element: etree._Element) -> int:
+def _line_of(element: etree._Element) -> int:
     line = element.sourceline
     return line if isinstance(line, int) else 0
 
@@ -126,7 +126,7 @@ class _Reader:
 
     def read_interval(self, interval: etree._Element) -> None:
         """Read an ``<interval>``, with relations, edges, or as a row of an E1 output."""
-        begin, end = self._number(interval, "begin"), self._number(interval, "end")
+        begin, end = self._read_number(interval, "begin"), self._read_number(interval, "end")
         if begin < 0 or end <= begin:
             self._leave_out(interval, f"the interval from {begin:g} to {end:g} is none")
             return
@@ -136,12 +136,12 @@ class _Reader:
             name = interval.get("id", "")
             # Those who passed it whole; a vehicle still on it when the slice ends is in the next.
             key = "nVehContrib" if interval.get("nVehContrib") is not None else "nVehEntered"
-            number = self._number(interval, key)
+            number = self._read_number(interval, key)
             if number < 0 or not name:
                 reason = f"{name}: {key} is {number:g}" if name else "the detector has no id"
                 self._leave_out(interval, reason)
                 return
-            self._outputs.append(VolumeRow(name, begin, end, number, _line(interval)))
+            self._outputs.append(VolumeRow(name, begin, end, number, _line_of(interval)))
             return
         for element in interval:
             if element.tag in ("tazRelation", "edgeRelation"):
@@ -165,21 +165,23 @@ class _Reader:
             listed = f"; it has {', '.join(others)}" if others else ""
             self._leave_out(element, f"{origin} to {destination}: no {name}{listed}")
             return
-        value = self._number(element, "probability" if share else name)
+        value = self._read_number(element, "probability" if share else name)
         if value < 0 or (share and value > 1):
             self._leave_out(element, f"{origin} to {destination}: {value:g}")
         elif element.tag == "tazRelation":
             if value > 0:
-                self._trips.append(TripRow(origin, destination, value, begin, end, _line(element)))
+                self._trips.append(
+                    TripRow(origin, destination, value, begin, end, _line_of(element))
+                )
         else:
             self._turns.append(
-                TurnRow(origin, destination, value, begin, end, share, _line(element))
+                TurnRow(origin, destination, value, begin, end, share, _line_of(element))
             )
 
     def _read_ratios(self, source: etree._Element, begin: float, end: float) -> None:
         for element in source.iterfind("toEdge"):
             self._rows += 1
-            value = self._number(element, "probability")
+            value = self._read_number(element, "probability")
             origin, destination = source.get("id"), element.get("id")
             if not origin or not destination:
                 self._leave_out(element, f"<{source.tag}> or <{element.tag}> has no id")
@@ -187,7 +189,7 @@ class _Reader:
                 self._leave_out(element, f"{origin} to {destination}: {value:g}")
             else:
                 self._turns.append(
-                    TurnRow(origin, destination, value, begin, end, True, _line(element))
+                    TurnRow(origin, destination, value, begin, end, True, _line_of(element))
                 )
 
     def _read_edge(self, element: etree._Element, begin: float, end: float) -> None:
@@ -208,13 +210,13 @@ class _Reader:
             others = ", ".join(sorted(str(key) for key in element.attrib if key != "id"))
             self._leave_out(element, f"edge {edge}: no count; it has {others or 'nothing'}")
             return
-        number = sum(self._number(element, name) for name in names)
+        number = sum(self._read_number(element, name) for name in names)
         if number < 0:
             self._leave_out(element, f"edge {edge}: {number:g} vehicles")
             return
         self._taken.update(names)
         self._stations[edge] = StationPlace(edge=edge)
-        self._edges.append(VolumeRow(edge, begin, end, number, _line(element)))
+        self._edges.append(VolumeRow(edge, begin, end, number, _line_of(element)))
 
     def read_definition(self, element: etree._Element) -> None:
         """Read where a detector is."""
@@ -251,24 +253,24 @@ class _Reader:
             return
         self._zones[name] = tuple(dict.fromkeys(edges))
 
-    def _number(self, element: etree._Element, name: str) -> float:
+    def _read_number(self, element: etree._Element, name: str) -> float:
         text = element.get(name)
         try:
             value = float(text or "")
         except ValueError:
-            value = _clock(text or "")
+            value = _read_clock(text or "")
         if not math.isfinite(value):
             raise InputError(
                 f"{name} of <{element.tag}> is no number: {shown(text)}",
-                element=f"line {_line(element)}",
+                element=f"line {_line_of(element)}",
             )
         return value
 
     def _leave_out(self, element: etree._Element, reason: str) -> None:
-        self._left.append(LeftOut(f"row {_line(element)} of the file", reason))
+        self._left.append(LeftOut(f"row {_line_of(element)} of the file", reason))
 
 
-def _clock(text: str) -> float:
+def _read_clock(text: str) -> float:
     """Seconds of a time written as ``h:m:s`` or ``d:h:m:s``; NaN of another text."""
     parts = text.split(":")
     if not 3 <= len(parts) <= 4 or not all(part.replace(".", "", 1).isdecimal() for part in parts):

@@ -122,7 +122,7 @@ class StampReader:
                 day, month = month, day
             return self._read_dated(text, (year, month, day), match.groups()[4:8], match[9])
         if match := _ONLY_TIME.fullmatch(text):
-            return Stamp(None, _seconds(match.groups()[:4], text), None, of_day=True)
+            return Stamp(None, _count_seconds(match.groups()[:4], text), None, of_day=True)
         if self._compact and (match := _COMPACT.fullmatch(text)):
             year = int(match[1]) + (2000 if len(match[1]) == 2 else 0)
             return self._read_dated(text, (year, int(match[2]), int(match[3])), (None,) * 4, None)
@@ -154,7 +154,7 @@ class StampReader:
         offset = _OFFSET.fullmatch(rest or "")
         if offset is None:
             raise InputError(f"{shown(text)} is no time: what is {shown(rest)}?")
-        second = _seconds(time, text) if time[0] is not None else 0.0
+        second = _count_seconds(time, text) if time[0] is not None else 0.0
         try:
             day = date(*ymd)
         except ValueError as error:
@@ -181,7 +181,7 @@ def _with_minutes(text: str) -> str:
     return text if re.search(r"[:.]", text) else f"{text}:00"
 
 
-def _seconds(parts: tuple[str | None, ...], text: str) -> float:
+def _count_seconds(parts: tuple[str | None, ...], text: str) -> float:
     hour, minute, second = (int(part or 0) for part in parts[:3])
     half = (parts[3] or "").lower().replace(".", "")
     if half:

@@ -83,7 +83,7 @@ def read_visum_matrix(text: str) -> TrafficFile:
             element=f"line {window.number}",
         )
     factor_line = _require_line(lines, "the factor")
-    factor = _number(factor_line.text.strip(), factor_line.number, comma=comma)
+    factor = _read_number(factor_line.text.strip(), factor_line.number, comma=comma)
     if factor <= 0:
         raise InputError(f"the factor is {factor:g}", element=f"line {factor_line.number}")
     if form == "V":
@@ -142,7 +142,7 @@ def _clock_seconds(word: str, line: int) -> float:
     return hours * 3600.0 + minutes * 60.0 + seconds
 
 
-def _number(word: str, line: int, *, comma: bool) -> float:
+def _read_number(word: str, line: int, *, comma: bool) -> float:
     try:
         return parse_number(word, decimal_comma=comma or "," in word)
     except InputError as error:
@@ -175,7 +175,7 @@ def _read_square(
         if found is None:
             raise InputError(f"the VISUM matrix has {index} cells; {size} zones need {size * size}")
         line, word = found
-        value = _number(word, line, comma=comma)
+        value = _read_number(word, line, comma=comma)
         origin, destination = zones[index // size], zones[index % size]
         if not 0 <= value <= MOST_TRIPS:
             left.append(
@@ -207,7 +207,7 @@ def _read_pairs(
             )
         origin, destination, word = words
         zones |= dict.fromkeys((origin, destination))
-        value = _number(word, line.number, comma=comma)
+        value = _read_number(word, line.number, comma=comma)
         if not 0 <= value <= MOST_TRIPS:
             reason = f"{origin} to {destination}: {value:g} trips"
             left.append(LeftOut(f"row {line.number} of the file", reason))

@@ -33,18 +33,18 @@ def expected_users(scenario: Scenario, *, until: float) -> dict[str, float]:
         Seconds at which the run ends. Matrices are drawn whole, whenever it ends.
     """
     found: dict[str, float] = {}
-    for place, name, number in _numbers(scenario, until):
+    for place, name, number in _count_parts(scenario, until):
         found[f"{place} {name!r}"] = found.get(f"{place} {name!r}", 0.0) + max(number, 0.0)
     if scenario.actors:
         found["actors"] = len(scenario.actors)
     return found
 
 
-def _numbers(scenario: Scenario, until: float) -> Iterator[tuple[str, str, float]]:
+def _count_parts(scenario: Scenario, until: float) -> Iterator[tuple[str, str, float]]:
     """Yield kind, id and number of each part."""
     demand = scenario.demand
     for flow in scenario.flows:
-        span = _passed(demand, flow.profile, flow.begin, min(flow.end, until))
+        span = _weighed_seconds(demand, flow.profile, flow.begin, min(flow.end, until))
         yield "flow", flow.id, flow.per_hour * span / 3600.0
     for line in scenario.transit.lines:
         end = min(scenario.simulation.duration if line.end is None else line.end, until)
@@ -56,7 +56,9 @@ def _numbers(scenario: Scenario, until: float) -> Iterator[tuple[str, str, float
         end = scenario.simulation.duration if part.end is None else part.end
         number = sum(part.volumes)
         if part.per_hour is not None:
-            number = part.per_hour * _passed(demand, part.profile, part.begin, end) / 3600.0
+            number = (
+                part.per_hour * _weighed_seconds(demand, part.profile, part.begin, end) / 3600.0
+            )
         yield "vehicle input", part.id, number
     for matrix in demand.matrices:
         yield "matrix", matrix.id, sum(number for _, _, number in matrix.trips)
@@ -67,7 +69,7 @@ def _numbers(scenario: Scenario, until: float) -> Iterator[tuple[str, str, float
             yield "counts", counts.id, sum(number for *_, number in counts.rows)
 
 
-def _passed(demand: Demand, profile: str | None, begin: float, end: float) -> float:
+def _weighed_seconds(demand: Demand, profile: str | None, begin: float, end: float) -> float:
     """Seconds between two times, weighed by a day profile; those of an unknown one are even."""
     if end <= begin:
         return 0.0

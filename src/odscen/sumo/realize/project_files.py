@@ -174,22 +174,22 @@ def lights_in_force(project: SumoProject, lights: Sequence[SumoLight]) -> tuple[
             stages = stage_numbers(states)
             phases = tuple(
                 Phase(
-                    _number(row.get("duration")) or 0.0,
+                    _read_number(row.get("duration")) or 0.0,
                     state,
                     f"{STAGE}{stage}" if stage else "",
-                    *_bounds(row),
+                    *_phase_bounds(row),
                 )
                 for row, state, stage in zip(rows, states, stages, strict=True)
             )
-            offset = _number(logic.get("offset")) or 0.0
+            offset = _read_number(logic.get("offset")) or 0.0
             light = light._replace(phases=phases, offset=offset)  # noqa: PLW2901
         found.append(light)
     return tuple(found)
 
 
-def _bounds(phase: etree._Element) -> tuple[float, float]:
+def _phase_bounds(phase: etree._Element) -> tuple[float, float]:
     """Bounds of a phase that vehicles may prolong; 0 and 0 where the file has none."""
-    least, most = _number(phase.get("minDur")), _number(phase.get("maxDur"))
+    least, most = _read_number(phase.get("minDur")), _read_number(phase.get("maxDur"))
     if least is None or most is None or least == most:
         return 0.0, 0.0
     return least, most
@@ -271,15 +271,15 @@ class _UserReader:
             self._types[element.get("id", "")] = _read_type(element)
         for element in root.iter("vTypeDistribution"):
             members = [self._types[m.get("id", "")] for m in element.iter("vType")]
-            members += [self._types[n] for n in _words(element, "vTypes") if n in self._types]
+            members += [self._types[n] for n in _split_words(element, "vTypes") if n in self._types]
             if members:
                 self._types[element.get("id", "")] = members[0]
         for element in root.iter("route"):
             if element.get("id"):
-                self._routes[str(element.get("id"))] = tuple(_words(element, "edges"))
+                self._routes[str(element.get("id"))] = tuple(_split_words(element, "edges"))
         for element in root.iter("routeDistribution"):
-            inner = [tuple(_words(route, "edges")) for route in element.iter("route")]
-            inner += [self._routes[n] for n in _words(element, "routes") if n in self._routes]
+            inner = [tuple(_split_words(route, "edges")) for route in element.iter("route")]
+            inner += [self._routes[n] for n in _split_words(element, "routes") if n in self._routes]
             if inner and element.get("id"):
                 self._routes[str(element.get("id"))] = inner[0]
 
@@ -300,7 +300,7 @@ class _UserReader:
             depart = seconds_of(element.get("depart"))
             if depart is None:
                 depart = self._until  # triggered by another: not due at any known time
-            self._add(name, depart, edges, kind, flow=None, appears=element.get("depart"))
+            self._add_user(name, depart, edges, kind, flow=None, appears=element.get("depart"))
 
     def _edges_of(self, element: etree._Element) -> tuple[str, ...]:
         """Edges of a route, or of a trip those that it names."""
@@ -310,16 +310,23 @@ class _UserReader:
         if inner is None and element.find("routeDistribution") is not None:
             inner = element.find("routeDistribution/route")
         if inner is not None:
-            return tuple(_words(inner, "edges"))
+            return tuple(_split_words(inner, "edges"))
         if element.tag in ("person", "personFlow"):
             stage = next(iter(element.iterchildren("walk", "ride", "personTrip")), None)
             if stage is None:
                 return ()
             if stage.get("route"):
                 return self._routes.get(str(stage.get("route")), ())
-            edges = _words(stage, "edges") or [*_words(stage, "from"), *_words(stage, "to")]
+            edges = _split_words(stage, "edges") or [
+                *_split_words(stage, "from"),
+                *_split_words(stage, "to"),
+            ]
             return tuple(edges)
-        return (*_words(element, "from"), *_words(element, "via"), *_words(element, "to"))
+        return (
+            *_split_words(element, "from"),
+            *_split_words(element, "via"),
+            *_split_words(element, "to"),
+        )
 
     def _add_flow(
         self, element: etree._Element, name: str, edges: tuple[str, ...], kind: _Type
@@ -327,10 +334,10 @@ class _UserReader:
         begin = seconds_of(element.get("begin")) or 0.0
         end = seconds_of(element.get("end"))
         last = min(self._until, math.inf if end is None else end)
-        number = _number(element.get("number"))
-        period = _number(element.get("period"))
+        number = _read_number(element.get("number"))
+        period = _read_number(element.get("period"))
         hourly = next(
-            (v for k in ("vehsPerHour", "perHour") if (v := _number(element.get(k)))), None
+            (v for k in ("vehsPerHour", "perHour") if (v := _read_number(element.get(k)))), None
         )
         if hourly:
             period = 3600.0 / hourly
@@ -346,9 +353,9 @@ class _UserReader:
             depart = begin + index * period
             if depart >= last - 1e-9 or (number is not None and index >= number):
                 break
-            self._add(f"{name}.{index}", depart, edges, kind, flow=name)
+            self._add_user(f"{name}.{index}", depart, edges, kind, flow=name)
 
-    def _add(
+    def _add_user(
         self,
         name: str,
         depart: float,
@@ -362,7 +369,7 @@ class _UserReader:
             return
         self._seen.add(name)
         triggered = appears is not None and seconds_of(appears) is None
-        start, end = self._place(edges), self._place(tuple(reversed(edges)), last=True)
+        start, end = self._find_node(edges), self._find_node(tuple(reversed(edges)), last=True)
         lanes = self._map.graph.lanes
         net = self._map.net
         whole = bool(edges) and all(edge in net.edge_lanes for edge in edges)
@@ -395,7 +402,7 @@ class _UserReader:
             )
         )
 
-    def _place(self, edges: tuple[str, ...], *, last: bool = False) -> int | None:
+    def _find_node(self, edges: tuple[str, ...], *, last: bool = False) -> int | None:
         """Node at the begin of the first edge that the map has, or at its end."""
         for edge in edges:
             ends = self._map.edge_ends.get(edge)
@@ -411,17 +418,17 @@ def _read_type(element: etree._Element) -> _Type:
     vclass = element.get("vClass", "passenger")
     category = _CLASSES.get(vclass, Category.CAR)
     usual = DEFAULT_BODY[category]
-    length = _number(element.get("length")) or _LENGTHS.get(vclass, usual.length)
-    width = _number(element.get("width")) or usual.width
-    speed = _number(element.get("maxSpeed")) or math.inf
+    length = _read_number(element.get("length")) or _LENGTHS.get(vclass, usual.length)
+    width = _read_number(element.get("width")) or usual.width
+    speed = _read_number(element.get("maxSpeed")) or math.inf
     return _Type(category, Body(length, width, usual.height), speed)
 
 
-def _words(element: etree._Element, name: str) -> list[str]:
+def _split_words(element: etree._Element, name: str) -> list[str]:
     return (element.get(name) or "").split()
 
 
-def _number(text: str | None) -> float | None:
+def _read_number(text: str | None) -> float | None:
     try:
         value = float(text or "")
     except ValueError:
@@ -439,4 +446,4 @@ def seconds_of(text: str | None) -> float | None:
             return None
         scale = (86_400.0, 3600.0, 60.0, 1.0)[-len(values) :]
         return sum(v * s for v, s in zip(values, scale, strict=True)) if len(values) <= 4 else None
-    return _number(text)
+    return _read_number(text)

@@ -416,7 +416,7 @@ def _add_lights(things: Furniture, lines: dict[str, tuple[RoadId, float]]) -> di
                 others = acts
             # The first head stands for all of them on the other lanes.
             if head == (heads or [element.id])[0]:
-                _refer(things, head, others)
+                _refer_to_head(things, head, others)
         name = head_of.get((heads or [element.id])[0])
         if controls and name is None:
             name = element.id
@@ -447,7 +447,7 @@ def _add_lights(things: Furniture, lines: dict[str, tuple[RoadId, float]]) -> di
     return controllers
 
 
-def _refer(things: Furniture, head: str, acts: Sequence[tuple[LanePlace, float]]) -> None:
+def _refer_to_head(things: Furniture, head: str, acts: Sequence[tuple[LanePlace, float]]) -> None:
     for place, s in acts:
         things.references[place.road].append(
             SignalReference(
@@ -489,7 +489,7 @@ def _add_sign(
 ) -> str:
     """Put up a sign, or let one that is there act here too; gives its path for the report."""
     if way in things.signal_ids:
-        _refer(things, way, [(place, s)])
+        _refer_to_head(things, way, [(place, s)])
         return f"road {place.road} > signalReference {shown_id(way)}"
     country, code, subtype = _sign_code(things, way, element)
     nodes = things.source.ways.get(way, ())
@@ -710,7 +710,7 @@ def _add_areas(things: Furniture) -> None:
         kind = tags.get("type", "")
         nodes = things.source.ways.get(way, ())
         if kind == "parking_space" and len(set(nodes)) >= 2:
-            width = _positive(tags.get("width", ""))
+            width = _read_positive(tags.get("width", ""))
             line = things.source.line(nodes)
             ahead = line[-1, :2] - line[0, :2]
             side = np.array([-ahead[1], ahead[0]]) / max(float(np.hypot(*ahead)), 1e-9)
@@ -738,7 +738,7 @@ def _add_areas(things: Furniture) -> None:
             )
 
 
-def _positive(text: str) -> float | None:
+def _read_positive(text: str) -> float | None:
     try:
         value = float(text)
     except ValueError:

@@ -476,7 +476,7 @@ def _chain_groups(
 ) -> list[Strip]:
     def next_group(group: Group) -> Group | None:
         """The group that continues a group lane by lane, its partner likewise."""
-        after = _continuation(network, group)
+        after = _find_continuation(network, group)
         if after is None:
             return None
         mine, other = partner.get(id(group)), partner.get(id(after))
@@ -484,7 +484,7 @@ def _chain_groups(
             return after
         if mine is None or other is None:
             return None
-        return after if _continuation(network, other) is mine else None
+        return after if _find_continuation(network, other) is mine else None
 
     before = {id(after): group for group in roads if (after := next_group(group))}
     strips: list[Strip] = []
@@ -511,7 +511,7 @@ def _chain_groups(
     return strips
 
 
-def _continuation(network: LaneNetwork, group: Group) -> Group | None:
+def _find_continuation(network: LaneNetwork, group: Group) -> Group | None:
     """The road that goes on with the same lanes, if there is one."""
     after = network.groups_after(group)
     if len(after) != 1 or after[0].is_connecting or after[0] is group:

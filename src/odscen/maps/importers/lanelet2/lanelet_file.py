@@ -216,22 +216,25 @@ def _place_nodes(
     if not nodes:
         raise InputError("there is no node", element="osm")
     ids = list(nodes)
-    heights = [_number(nodes[node][2].get("ele"), node, "ele", 0.0) for node in ids]
+    heights = [_read_number(nodes[node][2].get("ele"), node, "ele", 0.0) for node in ids]
     is_local = not origin and all(
         "local_x" in nodes[n][2] and "local_y" in nodes[n][2] for n in ids
     )
     degrees = np.array(
         [
             (
-                _number(nodes[node][0], node, "lat", None if not is_local else math.nan),
-                _number(nodes[node][1], node, "lon", None if not is_local else math.nan),
+                _read_number(nodes[node][0], node, "lat", None if not is_local else math.nan),
+                _read_number(nodes[node][1], node, "lon", None if not is_local else math.nan),
             )
             for node in ids
         ]
     )
     if is_local:
         local = np.array(
-            [[_number(nodes[n][2][axis], n, axis) for axis in ("local_x", "local_y")] for n in ids]
+            [
+                [_read_number(nodes[n][2][axis], n, axis) for axis in ("local_x", "local_y")]
+                for n in ids
+            ]
         )
         codes = Counter(
             found[1]
@@ -252,14 +255,14 @@ def _place_nodes(
         )
         xy, rows = local, [row]
     else:
-        xy, reference, rows = _project(degrees, origin)
+        xy, reference, rows = _project_to_origin(degrees, origin)
     points = {
         node: np.array((x, y, z)) for node, (x, y), z in zip(ids, xy.tolist(), heights, strict=True)
     }
     return points, reference, rows
 
 
-def _number(text: str | None, node: str, name: str, default: float | None = None) -> float:
+def _read_number(text: str | None, node: str, name: str, default: float | None = None) -> float:
     if text is None and default is not None:
         return default
     try:
@@ -273,10 +276,12 @@ def _number(text: str | None, node: str, name: str, default: float | None = None
     return value
 
 
-def _utm(lat: float, lon: float) -> tuple[int, float, float]:
+def _to_utm(lat: float, lon: float) -> tuple[int, float, float]:
     """Zone of a place, its easting and northing (negative south of the equator), metres."""
     zone = min(60, max(1, int((lon + 180.0) // 6.0) + 1))
-    x, y = _transform(_zone_reference(zone, 500000.0, 0.0), np.array([[lat, lon]]))[0].tolist()
+    x, y = _transform_degrees(_zone_reference(zone, 500000.0, 0.0), np.array([[lat, lon]]))[
+        0
+    ].tolist()
     return zone, x, y
 
 
@@ -288,7 +293,7 @@ def _zone_reference(zone: int, x_0: float, y_0: float) -> str:
     )
 
 
-def _transform(reference: str, degrees: FloatArray) -> FloatArray:
+def _transform_degrees(reference: str, degrees: FloatArray) -> FloatArray:
     from pyproj import Transformer
 
     transformer = Transformer.from_crs("EPSG:4326", reference, always_xy=True)
@@ -296,7 +301,9 @@ def _transform(reference: str, degrees: FloatArray) -> FloatArray:
     return np.stack([np.asarray(x), np.asarray(y)], axis=1)
 
 
-def _project(degrees: FloatArray, origin: str) -> tuple[FloatArray, str, list[ReportEntry]]:
+def _project_to_origin(
+    degrees: FloatArray, origin: str
+) -> tuple[FloatArray, str, list[ReportEntry]]:
     """UTM less the origin, as Lanelet2's ``UtmProjector`` has it."""
     if np.abs(degrees[:, 0]).max() > 84.5 or np.abs(degrees[:, 1]).max() > 180.0:
         worst = degrees[np.argmax(np.abs(degrees[:, 0]))]
@@ -316,7 +323,7 @@ def _project(degrees: FloatArray, origin: str) -> tuple[FloatArray, str, list[Re
             "origin does",
             0.9,
         )
-    return _transform(reference, degrees), reference, [row]
+    return _transform_degrees(reference, degrees), reference, [row]
 
 
 def projection_at(origin: str) -> tuple[str, str]:
@@ -333,7 +340,7 @@ def projection_at(origin: str) -> tuple[str, str]:
         raise InputError(f"origin {shown(origin)} is not LATITUDE,LONGITUDE") from None
     if not (abs(lat) <= 84.5 and abs(lon) <= 180.0):
         raise InputError(f"origin {shown(origin)} is no place that UTM has")
-    zone, x, y = _utm(lat, lon)
+    zone, x, y = _to_utm(lat, lon)
     reference = _zone_reference(zone, round(500000.0 - x, 6), round(-y, 6))
     return reference, f"UTM zone {zone} with x = y = 0 at latitude {lat:g}, longitude {lon:g}"
 
@@ -344,10 +351,10 @@ def _reference_of_local(local: FloatArray, degrees: FloatArray, zones: Counter[s
         return ""
     if np.abs(degrees[:, 0]).max() > 84.5:
         return ""
-    zone = int(zones.most_common(1)[0][0]) if zones else _utm(*degrees.mean(axis=0).tolist())[0]
+    zone = int(zones.most_common(1)[0][0]) if zones else _to_utm(*degrees.mean(axis=0).tolist())[0]
     if not 1 <= zone <= 60:
         return ""
-    grid = _transform(_zone_reference(zone, 500000.0, 0.0), degrees)
+    grid = _transform_degrees(_zone_reference(zone, 500000.0, 0.0), degrees)
     shift = np.median(grid - local, axis=0)
     # Squares of MGRS begin at whole kilometres: what is that near to one is one.
     whole = np.round(shift / 1000.0) * 1000.0
@@ -420,7 +427,7 @@ def _add_lanelet(
             found.lose("lanelet", identity, f"the ways of its {role} bound do not make one line")
             return
         bounds.append(bound)
-    left, right = _align(found, *bounds)
+    left, right = _align_bounds(found, *bounds)
     subtype = tags.get("subtype", "")
     if subtype not in DRIVEN | WALKED | {"crosswalk"}:
         said = subtype
@@ -505,7 +512,7 @@ def reversed_bound(bound: Bound) -> Bound:
     return Bound(bound.nodes[::-1], tuple(reversed(ways)))
 
 
-def _align(found: LaneletMap, left: Bound, right: Bound) -> tuple[Bound, Bound]:
+def _align_bounds(found: LaneletMap, left: Bound, right: Bound) -> tuple[Bound, Bound]:
     """Turn both bounds so that right is right of left, as ``lanelet::geometry::align`` does."""
     middles = [
         line[len(line) // 2] if len(line) > 2 else line.mean(axis=0)

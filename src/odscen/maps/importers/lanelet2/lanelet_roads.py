@@ -370,7 +370,7 @@ def _cut_ends(
                             if contact == "end"
                             else np.concatenate([tail[:-1], road.lines[k]])
                         )
-                _trim(road, contact)
+                _trim_road(road, contact)
                 continue
             outward = _direction_at(road.lines, last=contact == "end")
             corners = np.array([line[-1 if contact == "end" else 0, :2] for line in road.lines])
@@ -381,10 +381,10 @@ def _cut_ends(
             if is_linked and float(np.ptp(along)) > 0.4 * min(sizes):
                 offset = float(along.mean())
             road.ends[contact] = RoadEnd(outward, offset)
-            _trim(road, contact)
+            _trim_road(road, contact)
 
 
-def _trim(road: _StripRoad, contact: ContactPoint) -> None:
+def _trim_road(road: _StripRoad, contact: ContactPoint) -> None:
     last = contact == "end"
     tails = {}
     for k, border in enumerate(road.borders):
@@ -470,7 +470,7 @@ def _lay_bundle(
                     if contact == "start"
                     else np.concatenate([road.lines[k], tail[-2::-1]])
                 )
-        _trim(road, contact)  # type: ignore[arg-type]
+        _trim_road(road, contact)  # type: ignore[arg-type]
         links[contact] = RoadLink("road", other.id, there)  # type: ignore[index]
         for k, name in enumerate(names):
             lane_links[k][contact] = (other.lane_id(place_of[name][1]),)  # type: ignore[index]
@@ -513,7 +513,7 @@ def _build_road(
     inner = fitted.locate(np.array(corners))[0].tolist() if corners else []
     starts = [0.0, *sorted(inner)]
     edges = [*starts, fitted.length]
-    lanes = {0: Lane(0, "none", road_marks=_marks(network, fitted, laid, laid.separator))}
+    lanes = {0: Lane(0, "none", road_marks=_mark_border(network, fitted, laid, laid.separator))}
     steps = []
     for column, lanelets in enumerate(laid.columns):
         lane_id = laid.lane_id(column)
@@ -523,7 +523,7 @@ def _build_road(
             lane_id,
             LANE_TYPES[lanelets[0].subtype],
             widths=fitted.widths[column],
-            road_marks=_marks(network, fitted, laid, border),
+            road_marks=_mark_border(network, fitted, laid, border),
             speeds=tuple(_lane_speeds(network.source, lanelets, starts)),
             access=tuple(_lane_access(lanelets, starts)),
             predecessors=linked.get("start", ()),
@@ -662,7 +662,7 @@ def _lane_access(lanelets: Sequence[Lanelet], starts: Sequence[float]) -> Iterab
             last = rules
 
 
-def _marks(
+def _mark_border(
     network: LaneNetwork, fitted: FittedRoad, laid: _StripRoad, border: int
 ) -> tuple[RoadMark, ...]:
     """Road marks of a border by the ways that it is made of."""

@@ -94,7 +94,7 @@ class FittedRoad:
     def locate(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Give s and t of points; those before and behind the road lie at its ends."""
         plan = PlanView.of([self.geometry])
-        return _locate(plan, self.length, points)
+        return _locate_points(plan, self.length, points)
 
     def outline(self) -> FloatArray:
         """Ring around the road: its left border, and back along its right one; ``(2 K, 2)``."""
@@ -316,7 +316,9 @@ def _join_knots(knots: FloatArray, headings: FloatArray) -> tuple[Geometry, ...]
 
 
 # ----------------------------------------------------------------------------- borders
-def _locate(plan: PlanView, length: float, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _locate_points(
+    plan: PlanView, length: float, points: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Give s and t of points by the nearest point of the reference line, and Newton's method."""
     grid = np.linspace(0.0, length, max(9, math.ceil(length / _STEP) + 1))
     line = plan.at(np.zeros(grid.size, dtype=np.int64), grid)
@@ -341,7 +343,7 @@ def _choose_stations(plan: PlanView, length: float, borders: Sequence[FloatArray
     fine = np.linspace(0.0, length, max(9, math.ceil(length / _FINE_STEP) + 1))
     bent = np.abs(plan.at(np.zeros(fine.size, dtype=np.int64), fine).curvature) > _BENT
     even = np.concatenate([coarse, fine[bent]])
-    corners = [_locate(plan, length, border)[0] for border in borders]
+    corners = [_locate_points(plan, length, border)[0] for border in borders]
     stations: FloatArray = np.sort(np.concatenate([even, *corners]))
     kept = np.concatenate([[True], np.diff(stations) > 1e-3])
     stations = stations[kept]

@@ -1064,13 +1064,13 @@ def _put_up(
             text="",
             width=0.4 if dynamic else 0.6,
             height=1.0 if dynamic else 0.6,
-            validities=tuple(model.Validity(a, b) for a, b in _runs(ids)),
+            validities=tuple(model.Validity(a, b) for a, b in _runs_of_lanes(ids)),
         )
     )
     return signal
 
 
-def _runs(ids: Sequence[int]) -> list[tuple[int, int]]:
+def _runs_of_lanes(ids: Sequence[int]) -> list[tuple[int, int]]:
     """Runs of neighbouring lane ids."""
     runs: list[tuple[int, int]] = []
     for lane in ids:
@@ -1227,7 +1227,7 @@ def _draw_midway_signals(plans: dict[int, RoadPlan], found: Furniture, drawn: _D
                 text="",
                 width=0.4,
                 height=1.0,
-                validities=tuple(model.Validity(a, b) for a, b in _runs(ids)),
+                validities=tuple(model.Validity(a, b) for a, b in _runs_of_lanes(ids)),
             )
         )
         plan.objects.append(

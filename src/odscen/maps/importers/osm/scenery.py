@@ -90,11 +90,11 @@ def draw_scenery(
     for node in sorted(extract.nodes.values()):
         if node.tags.get("natural") != "tree" or node.id not in network.places:
             continue
-        crown = _metres(node.tags.get("diameter_crown", "")) or 2 * CROWN
+        crown = _read_metres(node.tags.get("diameter_crown", "")) or 2 * CROWN
         angles = np.arange(8) * math.pi / 4
         place = np.array(network.places[node.id])
         outline = place + crown / 2 * np.column_stack([np.cos(angles), np.sin(angles)])
-        height = _metres(node.tags.get("height", "")) or TREE_HEIGHT
+        height = _read_metres(node.tags.get("height", "")) or TREE_HEIGHT
         if _add_object(roads, tree, outline, "tree", node.tags, height, new_object):
             counts["tree"] += 1
     if counts["building"]:
@@ -139,14 +139,14 @@ def _close_ring(
 
 def _building_height(tags: Tags) -> tuple[float, bool]:
     """Metres, and whether the tags say it."""
-    height = _metres(tags.get("height", ""))
+    height = _read_metres(tags.get("height", ""))
     if height:
         return height, True
-    storeys = _metres(tags.get("building:levels", ""))
+    storeys = _read_metres(tags.get("building:levels", ""))
     return (storeys * STOREY, True) if storeys else (LOW_BUILDING, False)
 
 
-def _metres(text: str) -> float:
+def _read_metres(text: str) -> float:
     """A positive number with or without ``m``; 0 if it is none."""
     found = re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*m?", text.strip())
     return min(float(found[1].replace(",", ".")), 900.0) if found else 0.0
@@ -237,7 +237,7 @@ class StreetHeights:
         z = np.interp(s + plan.before, *profile)
         if np.abs(z).max() < LEVEL:
             return ()
-        grade = self._grades(plan, s)
+        grade = self._grades_at(plan, s)
         return tuple(
             hermite(float(s[i]), float(s[i + 1] - s[i]), z[i : i + 2], grade[i : i + 2])
             for i in range(len(s) - 1)
@@ -249,9 +249,9 @@ class StreetHeights:
         if profile is None:
             return 0.0, 0.0
         s = np.array([plan.line.length if at_end else 0.0])
-        return float(np.interp(s + plan.before, *profile)[0]), float(self._grades(plan, s)[0])
+        return float(np.interp(s + plan.before, *profile)[0]), float(self._grades_at(plan, s)[0])
 
-    def _grades(self, plan: RoadPlan, s: FloatArray) -> FloatArray:
+    def _grades_at(self, plan: RoadPlan, s: FloatArray) -> FloatArray:
         along, z = self.by_street[plan.street]
         graded: FloatArray = np.interp(s + plan.before, along, np.gradient(z, along))
         return graded

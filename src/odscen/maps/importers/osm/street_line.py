@@ -128,14 +128,14 @@ class StreetLine:
         return np.array([(*arc.start, arc.curvature, arc.length) for arc in self.arcs]).T
 
     @cached_property
-    def _trace(self) -> tuple[shapely.LineString, FloatArray]:
+    def _trace_with_s(self) -> tuple[shapely.LineString, FloatArray]:
         s = np.linspace(0.0, self.length, max(2, int(self.length / 0.5) + 2))
         return shapely.LineString(self.places(s)), s
 
     @property
     def trace(self) -> shapely.LineString:
         """Its places every half metre."""
-        return self._trace[0]
+        return self._trace_with_s[0]
 
     def project(self, x: float, y: float) -> float:
         """The s of the nearest place."""
@@ -143,7 +143,7 @@ class StreetLine:
 
     def project_all(self, places: FloatArray) -> FloatArray:
         """The s of the places nearest to others, shape ``(N, 2)``."""
-        trace, _ = self._trace
+        trace, _ = self._trace_with_s
         along = shapely.line_locate_point(trace, shapely.points(places))
         projected: FloatArray = along * self.length / max(trace.length, 1e-9)
         return projected

@@ -193,7 +193,7 @@ def build_network(
         else:
             ways[way.id] = way
 
-    georeference, places = _project(extract, ways, keeps_left=keeps_left)
+    georeference, places = _project_nodes(extract, ways, keeps_left=keeps_left)
     readings = _read_ways(extract, ways, places, country)
 
     # Nodes at which streets end: where not exactly two stretches meet, or where these do not fit.
@@ -223,7 +223,7 @@ def build_network(
     return network
 
 
-def _project(
+def _project_nodes(
     extract: Extract, ways: Mapping[int, Way], *, keeps_left: bool
 ) -> tuple[str, dict[int, tuple[float, float]]]:
     """Places of all nodes by a transverse Mercator projection at the middle of the streets."""

@@ -158,7 +158,7 @@ def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> M
             end_of(measure, until),
             found.closed_by(closed_places(measure)),
             frozenset(KINDS[category].vclass for category in banned_by(measure)),
-            *_destinations(measure, found),
+            *_resolve_destinations(measure, found),
         )
         for measure in active
         if isinstance(measure, RoadClosure | Roadworks | ChangedPermission)
@@ -188,7 +188,7 @@ def narrowed(width: float) -> float:
     return less / 3.6
 
 
-def _destinations(measure: Measure, found: MeasuredLanes) -> tuple[str, frozenset[str]]:
+def _resolve_destinations(measure: Measure, found: MeasuredLanes) -> tuple[str, frozenset[str]]:
     """What becomes of trips to what a measure closes, and the edges that it closes."""
     if not isinstance(measure, RoadClosure) or measure.destinations == "leave":
         return "leave", frozenset()
