@@ -15,6 +15,7 @@ ALL = (
     "lane_graph",
     "maps_add",
     "map_refusals",
+    "map_meaning",
     "netconvert_maps",
     "capacity",
     "saturation",
