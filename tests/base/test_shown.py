@@ -46,3 +46,12 @@ def test_messages_keep_their_lines_and_escape_what_cannot_be_seen() -> None:
 def test_of_many_words_some_are_listed_and_the_others_counted():
     assert some_of(["a", "b"]) == "a and b"
     assert some_of([str(n) for n in range(20_001)], most=2) == "0 and 1 and 19,999 more"
+
+
+def test_long_ids_that_differ_at_their_ends_are_told_apart() -> None:
+    """As netconvert numbers signals, behind the names of all nodes that it joined."""
+    cluster = f"cluster_{'1234567890_' * 8}"
+    told = [shown_id(f"{cluster}{number}") for number in (7, 8)]
+    assert told[0] != told[1]
+    assert told[0].startswith("'cluster_1234567890")
+    assert all(len(text) <= 62 for text in told)

@@ -108,7 +108,7 @@ REFUSED = {
         "road 1: there is another road",
     ),
     "two junctions of one id": (
-        document(road(), '<junction id="5"/><junction id="5" name="other"/>'),
+        document(road(), '<junction id="5"/><junction id="5" type="direct"/>'),
         "junction 5: there is another junction",
     ),
     "not a number": (

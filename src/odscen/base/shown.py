@@ -49,8 +49,11 @@ def shown_id(value: str) -> str:
     """An id in the path of an element: as it is where it is plain, else as :func:`shown`.
 
     Plain are letters and digits of ASCII and what ids are mostly joined with, but nothing that a
-    path itself has: spaces, ``>``, quotes.
+    path itself has: spaces, ``>``, quotes. Of a long one both ends stay: tools number the signals
+    of a junction behind its name.
     """
     if len(value) <= _LONGEST and _PLAIN.fullmatch(value):
         return value
+    if len(value) > _LONGEST:
+        value = f"{value[: _LONGEST - 23]}...{value[-20:]}"
     return shown(value).replace(": ", ":\\x20")  # a colon and a space end a path

@@ -30,7 +30,6 @@ from odscen.opendrive.parse_xml import (
     children,
     load,
     may_have_controls,
-    only,
     optional_number,
     refusal,
 )
@@ -44,6 +43,9 @@ IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"
 NO_HEADER: Final = Header(1, 4, "", None, None, None, None, "", None)
 """What stands for a missing ``<header>``: the oldest version, no bounds, no projection."""
 _CRS_TEXT: Final = re.compile(r"proj=|init=|EPSG:|ESRI:|CRS\[|CS\[", re.IGNORECASE)
+_DECLARED_ENCODING: Final = re.compile(
+    rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']"""
+)
 _LISTS: Final = frozenset({"objects", "object", "outlines", "outline", "signals"})
 """Elements whose children may be alike, or have rules of their own for that."""
 K = TypeVar("K")
@@ -77,7 +79,8 @@ def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
         if len(started) != len(text):
             detail = f"{len(text) - len(started)} characters before <?xml are skipped"
             notes.add(Rule.LEADING_SPACE, "map", detail)
-        root = load(started, max_bytes=MAX_BYTES, max_tags=MAX_TAGS)
+        decoded = _decode_as_meant(started, notes)
+        root = load(decoded, max_bytes=MAX_BYTES, max_tags=MAX_TAGS)
         if may_have_controls(text):
             _space_controls(root, notes)
         return _parse_root(root, notes)
@@ -90,6 +93,29 @@ def _without_leading_space(text: str | bytes) -> str | bytes:
         return start if start.startswith("<?xml") else text
     data = text.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
     return data if data.startswith(b"<?xml") and not text.startswith(b"\xef\xbb\xbf<") else text
+
+
+def _decode_as_meant(text: str | bytes, notes: Notes) -> str | bytes:
+    """The text itself, or decoded, where its declaration cannot be what its bytes are.
+
+    Windows writes names in its own letters under a declaration of UTF-8, and .NET one of UTF-16
+    above text that is none.
+    """
+    if isinstance(text, str) or b"\0" in text:  # UTF-16 has NUL bytes
+        return text
+    declared = _DECLARED_ENCODING.match(text)
+    name = declared[1].decode().lower().replace("-", "") if declared else "utf8"
+    if name not in ("utf8", "utf16"):
+        return text
+    try:
+        decoded, read = text.decode(), "UTF-8"
+    except UnicodeDecodeError:
+        decoded, read = text.decode("windows-1252", "replace"), "Windows-1252"
+    if (name, read) == ("utf8", "UTF-8"):
+        return text
+    detail = f"the bytes are no {'UTF-16' if name == 'utf16' else 'UTF-8'}; read as {read}"
+    notes.add(Rule.ENCODING, "map", detail)
+    return decoded.removeprefix("\ufeff")
 
 
 def _space_controls(root: Element, notes: Notes) -> None:
@@ -110,7 +136,7 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
         if tag not in READ:
             rule = Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN
             notes.skip(rule, "OpenDRIVE", tag, len(found))
-    header = _parse_header(root, only(groups, "header"), notes)
+    header = _parse_header(root, _first_of(groups, "header", notes), notes)
     elements = groups.get("road", [])
     if not elements:
         raise refusal(root, "there is no <road>")
@@ -128,7 +154,18 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
         raise twice.error
     junctions: dict[JunctionId, Junction] = {}
     for element in groups.get("junction", ()):
-        junction = parse_junction(element, roads, notes)
+        try:
+            junction = parse_junction(element, roads, notes)
+        except OpenDriveError as error:
+            detail = f"{error.problem}; the junction is left out, its roads are in none"
+            notes.add(Rule.CONNECTION_LEFT_OUT, error.element or element, detail)
+            continue
+        twin = junctions.get(junction.id)
+        if twin is not None and twin != junction and twin.type == junction.type:
+            detail = "another junction has the same id; it has the connections of both"
+            notes.add(Rule.REPEATED_ELEMENT, element, detail)
+            junctions[junction.id] = _join_junctions(twin, junction)
+            continue
         _add_unique(junctions, junction.id, junction, element, notes)
     controllers: dict[str, Controller] = {}
     for element in groups.get("controller", ()):
@@ -193,6 +230,16 @@ def _add_unique(known: dict[K, V], key: K, value: V, element: Element, notes: No
     known[key] = value
 
 
+def _join_junctions(one: Junction, other: Junction) -> Junction:
+    """A junction with the connections, priorities and controllers of two of one id."""
+    return replace(
+        one,
+        connections=tuple(dict.fromkeys((*one.connections, *other.connections))),
+        priorities=tuple(dict.fromkeys((*one.priorities, *other.priorities))),
+        controllers=tuple(dict.fromkeys((*one.controllers, *other.controllers))),
+    )
+
+
 def _add_controller(known: dict[str, Controller], element: Element, notes: Notes) -> None:
     """Add a controller, or its signals to the one of its id."""
     try:
@@ -224,9 +271,9 @@ def _parse_header(root: Element, element: Element | None, notes: Notes) -> Heade
         detail = f"OpenDRIVE {major}.{minor} is read by the rules of 1.4 to 1.8"
         notes.add(Rule.VERSION, element, detail)
     groups = children(element)
-    reference = only(groups, "geoReference")
+    reference = _first_of(groups, "geoReference", notes)
     text = "" if reference is None else (reference.text or "").strip()
-    offset = only(groups, "offset")
+    offset = _first_of(groups, "offset", notes)
     return Header(
         rev_major=major,
         rev_minor=minor,
@@ -239,6 +286,15 @@ def _parse_header(root: Element, element: Element | None, notes: Notes) -> Heade
         crs=_parse_crs(text, element, notes),
         offset=_parse_offset(offset, notes),
     )
+
+
+def _first_of(groups: dict[str, list[Element]], tag: str, notes: Notes) -> Element | None:
+    """The first of elements that only describe the file."""
+    found = groups.get(tag, [])
+    if len(found) > 1:
+        detail = f"there are {len(found)} <{tag}> elements where one is allowed; the first holds"
+        notes.add(Rule.PAINT, found[1], detail)
+    return found[0] if found else None
 
 
 def _read_revision(element: Element, name: str, usual: int, notes: Notes) -> int:

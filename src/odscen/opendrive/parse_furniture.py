@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 from odscen.base.errors import OpenDriveError
@@ -25,6 +26,7 @@ from odscen.opendrive.road_model import (
     RoadObject,
     Signal,
     SignalReference,
+    Validity,
 )
 
 if TYPE_CHECKING:
@@ -33,12 +35,10 @@ if TYPE_CHECKING:
 IGNORED: Final = frozenset({"bridge", "tunnel", "objectReference"})
 
 
-def parse_objects(container: Element | None, notes: Notes) -> tuple[RoadObject, ...]:
+def parse_objects(containers: Sequence[Element], notes: Notes) -> tuple[RoadObject, ...]:
     """All objects of a road, in the order of the file."""
-    if container is None:
-        return ()
     objects = []
-    for element in container:
+    for element in chain.from_iterable(containers):
         if element.tag == "object":
             try:
                 objects.append(_parse_object(element, notes))
@@ -120,20 +120,18 @@ def _parse_repeat(element: Element) -> ObjectRepeat:
 
 
 def parse_signals(
-    container: Element | None, notes: Notes
+    containers: Sequence[Element], notes: Notes
 ) -> tuple[tuple[Signal, ...], tuple[SignalReference, ...]]:
     """All signals and signal references of a road, in the order of the file."""
-    if container is None:
-        return (), ()
     signals = []
     references = []
-    for element in container:
+    for element in chain.from_iterable(containers):
         try:
             if element.tag == "signal":
                 signals.append(_parse_signal(element, notes))
                 continue
             if element.tag == "signalReference":
-                references.append(_parse_reference(element))
+                references.append(_parse_reference(element, notes))
                 continue
         except OpenDriveError as error:
             detail = f"{error.problem}; the {element.tag} is left out"
@@ -164,9 +162,9 @@ def _parse_signal(element: Element, notes: Notes) -> Signal:
         id=required(element, "id"),
         name=element.get("name", ""),
         s=number(element, "s"),
-        t=number(element, "t"),
-        z_offset=number_or(element, "zOffset", 0.0),
-        h_offset=number_or(element, "hOffset", 0.0),
+        t=_drawn_number(element, "t", notes) or 0.0,
+        z_offset=_drawn_number(element, "zOffset", notes) or 0.0,
+        h_offset=_drawn_number(element, "hOffset", notes) or 0.0,
         orientation=element.get("orientation", "none"),
         dynamic=_parse_dynamic(element, notes),
         country=element.get("country", ""),
@@ -175,9 +173,9 @@ def _parse_signal(element: Element, notes: Notes) -> Signal:
         value=value if value is None or factor is None else value * factor,
         unit="m/s" if factor is not None else unit,
         text=element.get("text", ""),
-        width=optional_number(element, "width"),
-        height=optional_number(element, "height"),
-        validities=validities(groups.get("validity", ())),
+        width=_drawn_number(element, "width", notes),
+        height=_drawn_number(element, "height", notes),
+        validities=_usable_validities(groups.get("validity", ()), notes),
         dependencies=_parse_dependencies(groups.get("dependency", ())),
     )
 
@@ -199,14 +197,35 @@ def _parse_dynamic(element: Element, notes: Notes) -> bool:
 
 
 def _parse_dependencies(elements: Sequence[Element]) -> tuple[tuple[str, str], ...]:
-    return tuple((required(element, "id"), element.get("type", "")) for element in elements)
+    named = ((element.get("id"), element.get("type", "")) for element in elements)
+    return tuple((name, kind) for name, kind in named if name)
 
 
-def _parse_reference(element: Element) -> SignalReference:
+def _parse_reference(element: Element, notes: Notes) -> SignalReference:
     return SignalReference(
         id=required(element, "id"),
         s=number(element, "s"),
-        t=number(element, "t"),
+        t=_drawn_number(element, "t", notes) or 0.0,
         orientation=element.get("orientation", "none"),
-        validities=validities(children(element).get("validity", ())),
+        validities=_usable_validities(children(element).get("validity", ()), notes),
     )
+
+
+def _usable_validities(elements: Sequence[Element], notes: Notes) -> tuple[Validity, ...]:
+    """Validities of a signal without those that cannot be read."""
+    found: list[Validity] = []
+    for element in elements:
+        try:
+            found += validities([element])
+        except OpenDriveError as error:
+            notes.add(Rule.UNKNOWN_VALUE, element, f"{error.problem}; the validity is left out")
+    return tuple(found)
+
+
+def _drawn_number(element: Element, name: str, notes: Notes) -> float | None:
+    """A number that only says how a signal looks; ``None`` if it is none."""
+    try:
+        return number(element, name) if name == "t" else optional_number(element, name)
+    except OpenDriveError as error:
+        notes.add(Rule.PAINT, element, f"{error.problem}; it is not used")
+        return None

@@ -60,9 +60,18 @@ def parse_junction(element: Element, roads: Mapping[RoadId, Road], notes: Notes)
             JunctionPriority(RoadId(found.get("high", "")), RoadId(found.get("low", "")))
             for found in groups.get("priority", ())
         ),
-        controllers=tuple(required(found, "id") for found in groups.get("controller", ())),
+        controllers=tuple(_controller_ids(groups.get("controller", ()), notes)),
         main_road=RoadId(main_road) if main_road else None,
     )
+
+
+def _controller_ids(elements: Iterable[Element], notes: Notes) -> Iterator[str]:
+    for element in elements:
+        name = element.get("id", "")
+        if name.strip():
+            yield name
+        else:
+            notes.add(Rule.DANGLING_LINK, element, "it names no controller; it is left out")
 
 
 def _read_connection(

@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import itertools
+import re
 import sys
 from dataclasses import replace
 from operator import attrgetter
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from odscen.base.errors import OpenDriveError
-from odscen.base.shown import shown_id
+from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_rules import (
     MAX_LANE_ID,
     MAX_ROAD_LENGTH,
     MAX_WIDTH,
     S_TOLERANCE,
+    STEP_BACK,
     Notes,
     Rule,
 )
-from odscen.opendrive.parse_values import cubics, ordered_s, speed, spelt_choice
+from odscen.opendrive.parse_values import (
+    cubics,
+    fill_missing,
+    ordered_s,
+    speed,
+    spelt_choice,
+    start_at_zero,
+)
 from odscen.opendrive.parse_xml import (
     Element,
     boolean,
@@ -56,7 +65,7 @@ _LANE_CHANGES: Final[dict[str | None, LaneChange]] = {
     "decrease": "decrease",
     "none": "none",
 }
-R = TypeVar("R", LaneHeight, LaneSpeed)
+R = TypeVar("R", LaneAccess, LaneHeight, LaneSpeed, RoadMark)
 
 
 def open_sole_layer(lanes: Element, notes: Notes) -> dict[str, list[Element]]:
@@ -95,11 +104,13 @@ def parse_sections(
             )
         raise refusal(lanes, "there is no laneSection")
     starts: list[float] = []
+    fill_missing(elements[0], ("s",), notes)
     for element in elements:
         s = number(element, "s", limit=MAX_ROAD_LENGTH)
+        s = s if starts else start_at_zero(element, "s", s, notes)
         if starts and s < starts[-1]:
             s = ordered_s(element, "s", s, starts[-1], notes)
-        if s > length + S_TOLERANCE:
+        if s > length + STEP_BACK:
             raise refusal(element, f"s={s:g} is beyond the road's length of {length:g}")
         if s > length:
             detail = f"s={s:.9g} is beyond the road's length of {length:.9g}; it starts there"
@@ -191,13 +202,15 @@ def _parse_lane(element: Element, side: str, s0: float, s_end: float, notes: Not
         for tag, count in unread(groups, READ).items():
             notes.skip(Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN, "lane", tag, count)
     predecessors, successors = _lane_links(only(groups, "link"), notes)
+    for records in (groups.get("width"), groups.get("border")):
+        _start_at_section(records[0] if records else None, notes)
     widths = cubics(groups.get("width", ()), "sOffset", s0, s_end, notes)
     borders = cubics(groups.get("border", ()), "sOffset", s0, s_end, notes)
     if lane_id:
         _check_widths(element, groups, notes)
     return Lane(
         id=lane_id,
-        type=sys.intern(element.get("type", "none")),
+        type=_parse_lane_type(element, notes),
         level=_drawn_boolean(element, "level", notes),
         widths=widths,
         borders=borders,
@@ -209,6 +222,45 @@ def _parse_lane(element: Element, side: str, s0: float, s_end: float, notes: Not
         successors=successors,
         direction=element.get("direction", "standard"),
     )
+
+
+_LANE_TYPES: Final = {
+    name.lower(): name
+    for name in (
+        *("shoulder", "border", "driving", "stop", "none", "restricted", "parking", "median"),
+        *("biking", "sidewalk", "walking", "curb", "exit", "entry", "onRamp", "offRamp", "rail"),
+        *("connectingRamp", "slipLane", "tram", "shared", "bus", "taxi", "HOV", "bidirectional"),
+        *("mwyEntry", "mwyExit", "special1", "special2", "special3", "roadWorks"),
+    )
+}
+"""Lane types of 1.4 to 1.8 by their names in lower case."""
+
+
+def _parse_lane_type(element: Element, notes: Notes) -> str:
+    """Type of a lane in the standard's spelling; as it is where the standard does not know it."""
+    text = element.get("type")
+    if text is None:
+        if element.get("id") != "0":
+            notes.add(Rule.UNKNOWN_VALUE, element, "type is missing; no road user uses the lane")
+        return "none"
+    known = _LANE_TYPES.get(text.strip().lower())
+    if known is None or known == text:
+        return sys.intern(text)
+    notes.add(Rule.SPELLING, element, f"type={shown(text)} is read as {known}")
+    return known
+
+
+def _start_at_section(record: Element | None, notes: Notes) -> None:
+    """Have the first width or border of a lane begin where its section does, if it nearly does."""
+    text = None if record is None else record.get("sOffset")
+    if record is None or text in (None, "0", "0.0"):
+        return
+    try:
+        s = number(record, "sOffset")
+    except OpenDriveError:
+        return  # that is said where it is read
+    if start_at_zero(record, "sOffset", s, notes) != s:
+        record.set("sOffset", "0")
 
 
 def _check_widths(element: Element, groups: dict[str, list[Element]], notes: Notes) -> None:
@@ -235,7 +287,10 @@ def _lane_links(link: Element | None, notes: Notes) -> tuple[tuple[int, ...], tu
         if not element.get("id", "").strip():
             notes.add(Rule.DANGLING_LINK, element, "it names no lane; the link is left out")
             continue
-        linked[str(element.tag)].append(integer(element, "id", limit=MAX_LANE_ID))
+        try:
+            linked[str(element.tag)].append(integer(element, "id", limit=MAX_LANE_ID))
+        except OpenDriveError as error:
+            notes.add(Rule.DANGLING_LINK, element, f"{error.problem}; the link is left out")
     return tuple(linked["predecessor"]), tuple(linked["successor"])
 
 
@@ -258,15 +313,20 @@ def _parse_heights(elements: Sequence[Element], s0: float, notes: Notes) -> tupl
             found.append((element, LaneHeight(_parse_s(element, s0), inner, outer)))
         except OpenDriveError as error:
             notes.add(Rule.PAINT, element, f"{error.problem}; the height is left out")
-    return _order_records(found, notes)
+    return _in_order(found, notes)
 
 
 def _parse_speeds(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneSpeed, ...]:
-    read = ((element, speed(element, notes)) for element in elements)
-    found = ((element, value) for element, value in read if value is not None)
-    return _order_records(
-        [(element, LaneSpeed(_parse_s(element, s0), value)) for element, value in found], notes
-    )
+    found: list[tuple[Element, LaneSpeed]] = []
+    for element in elements:
+        value = speed(element, notes)
+        if value is None:
+            continue
+        try:
+            found.append((element, LaneSpeed(_parse_s(element, s0), value)))
+        except OpenDriveError as error:
+            notes.add(Rule.SPEED, element, f"{error.problem}; no speed is given")
+    return _in_order(found, notes)
 
 
 _ACCESS_RULES: Final[dict[str | None, str]] = {
@@ -279,13 +339,51 @@ _ACCESS_RULES: Final[dict[str | None, str]] = {
 
 def _parse_access(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneAccess, ...]:
     """One record per restriction: an attribute up to 1.7, elements below from 1.8 on."""
-    records = []
+    found = []
     for element in elements:
-        rule = spelt_choice(element, "rule", _ACCESS_RULES, notes)
+        rule = spelt_choice(element, "rule", _ACCESS_RULES, notes, otherwise="")
         below = [str(child.get("type", "")) for child in element if child.tag == "restriction"]
-        names = below or [str(element.get("restriction", ""))]
-        records += [LaneAccess(_parse_s(element, s0), rule, name) for name in names]
-    return tuple(records)
+        given = below or [str(element.get("restriction", ""))]
+        names = [name for text in given for name in _spell_restrictions(text, element, notes)]
+        if not names:
+            notes.add(
+                Rule.ACCESS_LEFT_OUT, element, "it names no road user; the access is left out"
+            )
+        try:
+            s = _parse_s(element, s0)
+        except OpenDriveError as error:
+            detail = f"{error.problem}; the access is left out"
+            notes.add(Rule.ACCESS_LEFT_OUT, element, detail)
+            continue
+        found += [(element, LaneAccess(s, rule, name)) for name in names]
+    return _in_order(found, notes)
+
+
+_RESTRICTIONS: Final = {
+    name.lower(): name
+    for name in (
+        *("simulator", "autonomousTraffic", "pedestrian", "passengerCar", "bus", "delivery"),
+        *("emergency", "taxi", "throughTraffic", "truck", "trucks", "bicycle", "motorcycle"),
+        *("HOV", "none"),
+    )
+}
+"""Road users of ``<access>`` by their names in lower case (``e_accessRestrictionType``)."""
+
+
+def _spell_restrictions(text: str, element: Element, notes: Notes) -> list[str]:
+    """The road users that a restriction names, in the standard's spelling where they are known."""
+    if text in _RESTRICTIONS.values():
+        return [text]
+    whole = _RESTRICTIONS.get(re.sub(r"[\s_-]+", "", text.lower()))
+    parts = [part for part in re.split(r"[\s,;|]+", text) if part]
+    known = [_RESTRICTIONS.get(part.lower()) for part in parts]
+    names = [whole] if whole else [name for name in known if name]
+    if not whole and len(names) < len(parts):
+        return [text.strip()]
+    if names:
+        detail = f"restriction={shown(text)} is read as {', '.join(names)}"
+        notes.add(Rule.SPELLING, element, detail)
+    return names
 
 
 def _road_marks(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[RoadMark, ...]:
@@ -314,13 +412,7 @@ def _road_marks(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[R
             )
         )
         placed.append(element)
-    for (before, mark), element in zip(itertools.pairwise(marks), placed[1:], strict=True):
-        if mark.s < before.s:
-            offsets = f"{element.get('sOffset')} is below that of the mark before"
-            notes.add(Rule.MARK_ORDER, element, f"sOffset={offsets}; marks are put in order")
-            marks.sort(key=_start)  # stable: of marks at the same s the later one holds
-            break
-    return tuple(marks)
+    return _in_order(list(zip(placed, marks, strict=True)), notes)
 
 
 def _painted_width(element: Element, notes: Notes) -> float:
@@ -335,13 +427,12 @@ def _painted_width(element: Element, notes: Notes) -> float:
 _start = attrgetter("s")
 
 
-def _order_records(found: Sequence[tuple[Element, R]], notes: Notes) -> tuple[R, ...]:
+def _in_order(found: Sequence[tuple[Element, R]], notes: Notes) -> tuple[R, ...]:
     """Records with the elements that they are from, in ascending order of s."""
-    records: list[R] = []
-    for element, record in found:
-        if records and record.s < records[-1].s:
-            own = number_or(element, "sOffset", 0.0)
-            ordered_s(element, "sOffset", own, own + records[-1].s - record.s, notes)
-            record = record._replace(s=records[-1].s)  # noqa: PLW2901
-        records.append(record)
-    return tuple(records)
+    for (_, before), (element, record) in itertools.pairwise(found):
+        if record.s < before.s:
+            detail = f"is below that of the {element.tag} before; they are put in order"
+            notes.add(Rule.MARK_ORDER, element, f"sOffset={element.get('sOffset')} {detail}")
+            break
+    # Stable: of two at the same s the later one holds.
+    return tuple(sorted((record for _, record in found), key=_start))

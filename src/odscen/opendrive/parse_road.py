@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+import math
+from itertools import pairwise
+from operator import attrgetter
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -23,7 +26,13 @@ from odscen.opendrive.parse_rules import (
     Notes,
     Rule,
 )
-from odscen.opendrive.parse_values import cubics, speed, spelt_choice
+from odscen.opendrive.parse_values import (
+    cubics,
+    fill_missing,
+    speed,
+    spelt_choice,
+    start_at_zero,
+)
 from odscen.opendrive.parse_xml import (
     Element,
     children,
@@ -53,7 +62,13 @@ READ: Final = frozenset(
     | {"signals"}
 )
 IGNORED: Final = frozenset({"surface", "railroad"})
-_TRAFFIC_RULES: Final[dict[str | None, TrafficRule]] = {None: "RHT", "RHT": "RHT", "LHT": "LHT"}
+_TRAFFIC_RULES: Final[dict[str | None, TrafficRule]] = {
+    None: "RHT",
+    "": "RHT",
+    "RHT": "RHT",
+    "LHT": "LHT",
+}
+_LINKED: Final[dict[str, Literal["road", "junction"]]] = {"road": "road", "junction": "junction"}
 _CONTACT_POINTS: Final[dict[str | None, ContactPoint | None]] = {
     None: None,
     "": None,
@@ -69,6 +84,7 @@ def parse_road(element: Element, notes: Notes) -> Road:
         if tag not in READ and tag != "userData":
             rule = Rule.IGNORED if tag in IGNORED else Rule.UNKNOWN
             notes.skip(rule, "road", tag, len(found))
+    _fill_lengths(element, notes)
     link = only(groups, "link")
     length, is_point = _parse_length_or_point(element, link, notes)
     lateral = _container_children(groups, "lateralProfile", {"superelevation"}, notes)
@@ -76,7 +92,7 @@ def parse_road(element: Element, notes: Notes) -> Road:
     if lanes is None:
         raise refusal(element, "there is no <lanes>")
     lane_groups = open_sole_layer(lanes, notes)
-    signals, references = parse_signals(only(groups, "signals"), notes)
+    signals, references = parse_signals(groups.get("signals", ()), notes)
     return Road(
         id=RoadId(required(element, "id")),
         name=element.get("name", ""),
@@ -96,10 +112,37 @@ def parse_road(element: Element, notes: Notes) -> Road:
         superelevation=_parse_profile(lateral, "superelevation", length, notes),
         lane_offset=_parse_profile(lane_groups, "laneOffset", length, notes),
         sections=parse_sections(lanes, lane_groups, length, notes),
-        objects=parse_objects(only(groups, "objects"), notes),
+        objects=parse_objects(groups.get("objects", ()), notes),
         signals=signals,
         signal_references=references,
     )
+
+
+def _fill_lengths(road: Element, notes: Notes) -> None:
+    """Put the lengths that are missing, of geometries and of a road, where the others say them."""
+    plan = road.findall("planView/geometry")
+    starts = [geometry.get("s", "0") for geometry in plan]
+    for row, geometry in enumerate(plan):
+        if geometry.get("length") is not None:
+            continue
+        end = starts[row + 1] if row + 1 < len(plan) else road.get("length")
+        _put_length(geometry, _sum_of(end, starts[row], -1.0), notes)
+    if plan and road.get("length") is None:
+        _put_length(road, _sum_of(plan[-1].get("length"), starts[-1]), notes)
+
+
+def _sum_of(text: str | None, other: str, sign: float = 1.0) -> float:
+    """The sum of two numbers; NaN if one of them is none."""
+    try:
+        return float(text or "nan") + sign * float(other)
+    except ValueError:
+        return math.nan
+
+
+def _put_length(element: Element, length: float, notes: Notes) -> None:
+    if length > 0.0:
+        element.set("length", repr(length))
+        notes.add(Rule.MISSING_NUMBER, element, f"length is missing; it is {length:.6g} m")
 
 
 def _parse_length_or_point(
@@ -122,7 +165,7 @@ def _parse_junction_id(element: Element, notes: Notes) -> JunctionId | None:
         detail = "junction is missing" if text is None else "junction is empty"
         notes.add(Rule.JUNCTION_ATTRIBUTE, element, f"{detail}; the road is in no junction")
         return None
-    return None if text == "-1" else JunctionId(text)
+    return None if text.strip() == "-1" else JunctionId(text)
 
 
 def _road_link(link: Element | None, tag: str, notes: Notes) -> RoadLink | None:
@@ -131,16 +174,24 @@ def _road_link(link: Element | None, tag: str, notes: Notes) -> RoadLink | None:
     element = only(children(link), tag)
     if element is None:
         return None
-    element_type = element.get("elementType")
-    if element_type not in {"road", "junction"}:
-        detail = f"elementType={shown(element_type)} is neither road nor junction"
+    element_type = _LINKED.get(element.get("elementType", "").strip().lower())
+    if element_type and element_type != element.get("elementType"):
+        detail = f"elementType={shown(element.get('elementType'))} is read as {element_type}"
+        notes.add(Rule.SPELLING, element, detail)
+    if "elementType" not in element.attrib and element.get("contactPoint"):
+        # A link to a junction has no contact point.
+        detail = "elementType is missing; it has a contactPoint, as links to roads have"
+        notes.add(Rule.UNKNOWN_VALUE, element, detail)
+        element_type = "road"
+    if element_type is None:
+        detail = f"elementType={shown(element.get('elementType'))} is neither road nor junction"
         notes.add(Rule.DANGLING_LINK, element, f"{detail}; the link is left out")
         return None
     # Which end a link without contactPoint means is looked for once all roads are known.
     contact_point = spelt_choice(element, "contactPoint", _CONTACT_POINTS, notes, otherwise=None)
     element_s = element.get("elementS") or None
     return RoadLink(
-        "road" if element_type == "road" else "junction",
+        element_type,
         required(element, "elementId"),
         contact_point,
         None if element_s is None else number(element, "elementS", limit=MAX_ROAD_LENGTH),
@@ -151,18 +202,27 @@ def _road_link(link: Element | None, tag: str, notes: Notes) -> RoadLink | None:
 def _road_types(elements: Sequence[Element], notes: Notes) -> tuple[RoadType, ...]:
     types: list[RoadType] = []
     for element in elements:
-        limit = only(children(element), "speed")
+        limits = [child for child in element if child.tag == "speed"]
         try:
             s = number(element, "s", limit=MAX_ROAD_LENGTH)
         except OpenDriveError as error:
             if types:
-                raise
+                notes.add(Rule.UNKNOWN_VALUE, element, f"{error.problem}; the type is left out")
+                continue
             # Of the first type of a road one knows where it begins.
             notes.add(Rule.UNKNOWN_VALUE, element, f"{error.problem}; it begins at s=0")
             s = 0.0
-        own = None if limit is None else speed(limit, notes)
+        given = {speed(limit, notes) for limit in limits}
+        if len(given) > 1:
+            notes.add(Rule.SPEED, element, f"there are {len(limits)} speeds; no speed is given")
+        own = given.pop() if len(given) == 1 else None
         types.append(RoadType(s, element.get("type", ""), own))
-    return tuple(types)
+    for before, after in pairwise(types):
+        if after.s < before.s:
+            detail = f"is below that of the {elements[0].tag} before; they are put in order"
+            notes.add(Rule.MARK_ORDER, elements[0], f"s={after.s:g} {detail}")
+            break
+    return tuple(sorted(types, key=attrgetter("s")))
 
 
 def _container_children(
@@ -189,6 +249,7 @@ def _plan_view(
     elements = [] if plan_view is None else children(plan_view).get("geometry", [])
     if not elements:
         raise refusal(road, "there is no planView geometry")
+    fill_missing(elements[0], ("s",), notes)
     geometry: list[Geometry] = []
     if point is not None:
         limits = {"x": MAX_COORDINATE, "y": MAX_COORDINATE, "hdg": MAX_NUMBER}
@@ -200,6 +261,8 @@ def _plan_view(
             geometry.append(found)
     if not geometry:
         raise refusal(road, "every planView geometry has the length 0")
+    first = geometry[0]
+    geometry[0] = first._replace(s=start_at_zero(elements[0], "s", first.s, notes))
     if abs(geometry[0].s) > S_TOLERANCE:
         raise refusal(road, f"the planView starts at s={geometry[0].s:g}, not at 0")
     return tuple(geometry)

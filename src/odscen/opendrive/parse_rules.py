@@ -65,12 +65,21 @@ class Rule(StrEnum):
     kept; of such a record of a profile its first coefficient."""
     RECORD_ORDER = "record-order"
     """A record, section or geometry that starts less than 5 cm before the one in front of it starts
-    where that one does; of geometries the one of less than 5 cm is left out."""
+    where that one does; of geometries the one of less than 5 cm is left out. The first one starts
+    at 0, and a section at the end of the road, if they are less than 5 cm behind it."""
     PAINT = "paint"
     """What a road mark, a height or a header says that only paints, and cannot be read, counts as
     not given."""
     MARK_ORDER = "mark-order"
-    """Road marks may be written in any order; each holds from its ``sOffset`` to the next."""
+    """Marks, speeds, heights and access of a lane, and types of a road, may be written in any
+    order; each holds from where it begins to the next."""
+    MISSING_NUMBER = "missing-number"
+    """Coefficients b, c and d of a record that are missing are 0; the first record, section or
+    geometry that does not say where it begins does so at 0; a missing length is what the next s,
+    the road's length or the plan view says."""
+    ENCODING = "encoding"
+    """Bytes that cannot be what the declaration says are read as UTF-8, or as Windows-1252 where
+    they are none: only names can have letters that differ."""
     LATE_START = "late-start"
     """A profile of the road that starts after s = 0 is zero before."""
     SAME_S = "same-s"
@@ -97,6 +106,8 @@ class Rule(StrEnum):
     """``heightInner`` and ``heightOuter`` of a lane's height are read as ``inner``, ``outer``."""
     OBJECT_LEFT_OUT = "object-left-out"
     """An object without an id, or with a number that is missing or none, is left out."""
+    ACCESS_LEFT_OUT = "access-left-out"
+    """An ``<access>`` that does not say where it begins, or names no road user, is left out."""
     SIGNAL_LEFT_OUT = "signal-left-out"
     """A signal, reference or controller without an id, or with a number that is missing or none, is
     left out."""
@@ -112,6 +123,7 @@ class Rule(StrEnum):
 
 LOSING_RULES: Final = frozenset(
     {Rule.ROAD_LEFT_OUT, Rule.CONNECTION_LEFT_OUT, Rule.OBJECT_LEFT_OUT, Rule.SIGNAL_LEFT_OUT}
+    | {Rule.ACCESS_LEFT_OUT}
 )
 """Rules by which something of the file is lost, not repaired."""
 

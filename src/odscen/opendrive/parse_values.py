@@ -12,6 +12,7 @@ from odscen.base.shown import shown
 from odscen.opendrive.parse_rules import (
     MAX_LANE_ID,
     MAX_NUMBER,
+    S_TOLERANCE,
     SLIVER_LENGTH,
     STEP_BACK,
     Notes,
@@ -61,6 +62,7 @@ def cubics(
         if not plain:
             # The slow way finds the attribute at fault and says so.
             following = elements[row + 1] if row + 1 < len(elements) else None
+            fill_missing(element, (*(() if row else (s_name,)), "b", "c", "d"), notes)
             end = s_end - s0 if following is None else number(following, s_name)
             s, a, b, c, d = _parse_record(element, s_name, end, notes)
         if s <= last:
@@ -68,6 +70,24 @@ def cubics(
         last = s
         records.append(Cubic(s0 + s, a, b, c, d))
     return tuple(records)
+
+
+def fill_missing(element: Element, names: Sequence[str], notes: Notes) -> None:
+    """Put 0 for attributes that are not there, and note them."""
+    missing = [name for name in names if element.get(name) is None]
+    if missing:
+        detail = f"{', '.join(missing)} missing; that counts as 0"
+        notes.add(Rule.MISSING_NUMBER, element, detail)
+    for name in missing:
+        element.set(name, "0")
+
+
+def start_at_zero(element: Element, s_name: str, s: float, notes: Notes) -> float:
+    """Where the first record starts: at 0 if it is less than :data:`STEP_BACK` behind it."""
+    if S_TOLERANCE < s < STEP_BACK:
+        notes.add(Rule.RECORD_ORDER, element, f"{s_name}={s:.9g} is behind 0; it starts there")
+        return 0.0
+    return s
 
 
 def _parse_record(element: Element, s_name: str, end: float, notes: Notes) -> tuple[float, ...]:

@@ -35,6 +35,9 @@ _NAMED = frozenset({"road", "lane", "object", "signal", "junction", "connection"
 _SINGLE = frozenset({"header", "geoReference", "offset", "predecessor", "successor", "speed"})
 
 
+_WHOLE: Final = re.compile(r"([-+]?\d+)\.0*")
+"""Whole numbers as writers of real numbers have them."""
+
 CONTROLS: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 """Characters that XML permits in attributes, and that no line of text can show."""
 
@@ -163,8 +166,9 @@ def number_or(element: Element, name: str, default: float) -> float:
 def integer(element: Element, name: str, *, limit: int = 10**9) -> int:
     """A whole number that must be there."""
     text = required(element, name)
+    whole = _WHOLE.fullmatch(text.strip())
     try:
-        value = int(text.replace("_", "?"))
+        value = int(whole[1] if whole else text.replace("_", "?"))
     except ValueError as err:
         raise refusal(element, f"{name}={shown(text)} is not a whole number") from err
     if abs(value) > limit:
@@ -196,10 +200,11 @@ def children(element: Element) -> dict[str, list[Element]]:
 
 
 def only(groups: Mapping[str, list[Element]], tag: str) -> Element | None:
-    """The one child of that name or ``None``; several are refused."""
+    """The one child of that name or ``None``; several are refused that say something."""
     found = groups.get(tag)
     if not found:
         return None
+    found = [element for element in found if len(element) or element.attrib] or found[:1]
     if len(found) > 1:
         raise refusal(found[1], f"there are {len(found)} <{tag}> elements where one is allowed")
     return found[0]

@@ -104,6 +104,10 @@ def test_crosswalks_that_leave_no_road_between_them_join_the_junctions() -> None
     assert "J10" in junctions
     assert "J20" not in junctions
     assert network.report.figures["crossings"] == 2
+    # Who comes over the road, each way, is what its lights are for: no road is left before them.
+    (light,) = network.table.lights
+    assert {name for names in light.signals for name in names} == {"71", "72"}
+    assert not [entry for entry in network.report.entries if entry.outcome == "lost"]
 
 
 def test_one_crosswalk_in_the_middle_of_a_short_road_leaves_both_junctions() -> None:

@@ -98,11 +98,23 @@ def test_a_lane_to_turn_left_from_both_ways_stays_out() -> None:
     assert "open both ways" in lost(network)["road 1"]
 
 
-@pytest.mark.parametrize("kind", ["tram", "rail"])
-def test_rails_are_for_no_road_user_of_a_scenario(kind: str) -> None:
+TRACKS = {"tram": {"tram"}, "rail": {"rail", "rail_electric", "rail_fast", "rail_urban"}}
+
+
+@pytest.mark.parametrize("kind", TRACKS)
+def test_tracks_are_lanes_of_sumo_for_rail_vehicles_and_for_no_road_user(kind: str) -> None:
     network = made(lane(-1), lane(-2, kind=kind))
-    assert list(permissions(network)) == ["1.0.f_0"]
-    assert "rail vehicles" in lost(network)["road 1"]
+    assert permissions(network) == {"1.0.f_0": TRACKS[kind], "1.0.f_1": allowed("driving")}
+    assert graph_lanes(network) == {-1}
+    assert lost(network) == {}
+    assert network.network.report.figures["rail_road_covered"] == pytest.approx(100.0)
+    assert verify(network.network.net_xml, network.odr, network.roads).passed
+
+
+def test_a_road_of_tracks_alone_leaves_the_graph_as_it_is() -> None:
+    alone = made(lane(1, kind="tram"), lane(-1, kind="tram"))
+    assert permissions(alone) == {"1.0.f_0": {"tram"}, "1.0.b_0": {"tram"}}
+    assert len(alone.graph.lanes.x) == 0
 
 
 @pytest.mark.parametrize(

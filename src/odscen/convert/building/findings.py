@@ -72,9 +72,6 @@ def _find_outermost_edge(edges: Sequence[EdgePlan], numbers: Sequence[int], *, a
 BOTH_WAYS = "bidirectional"
 """Lane type (up to 1.7) of lanes for both directions, mostly for turning left from the middle."""
 
-RAIL_TYPES = frozenset({"tram", "rail"})
-"""Lane types for vehicles that no scenario has."""
-
 WORTH_TELLING = 0.5
 """Metres of a lane without SUMO lane that make an entry."""
 
@@ -86,6 +83,9 @@ WIDTH_PLACES = 9
 
 AREA = 1.5
 """Metres of a walk that walking areas, which are no lanes, may take without an entry."""
+
+WALKING_AREA = "they are walking areas, on which persons turn and wait"
+"""Why the ends of a walk have no SUMO lane where it is kept all the same."""
 
 CROSSING_REACH = 20.0
 """Metres from a crossing within which its pedestrian lights stand."""
@@ -169,9 +169,10 @@ def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> It
             gap = length - covered.get(key, 0.0)
             if gap > (AREA if kind in WALKABLE_TYPES and gap < length else WORTH_TELLING):
                 where = "" if odr.roads[key.road].junction is None else " of a connecting road"
-                why = _why_uncovered(odr, table, row)
+                why = _why_uncovered(odr, table, row, whole=gap >= length)
                 reason = f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: {why}"
-                yield ReportEntry(ElementOutcome.LOST, _describe_place(*key), reason)
+                outcome = ElementOutcome.KEPT if why == WALKING_AREA else ElementOutcome.LOST
+                yield ReportEntry(outcome, _describe_place(*key), reason)
             if odr.roads[key.road].sections[key.section].lanes[key.lane].direction == "both":
                 reason = "open both ways; SUMO has it in one direction only, that of its side"
                 yield ReportEntry(ElementOutcome.LOST, _describe_place(*key), reason)
@@ -179,8 +180,6 @@ def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> It
             reason = f"lanes of type {kind} are open to no road user and left out"
             if kind == BOTH_WAYS:
                 reason = f"lanes of type {kind} are open both ways, as no lane of SUMO: left out"
-            elif kind in RAIL_TYPES:
-                reason = f"lanes of type {kind} are for rail vehicles, no road users: left out"
             elif kind == "restricted":
                 reason = "lanes of type restricted, on which no access allows vehicles: left out"
             yield ReportEntry(ElementOutcome.LOST, f"road {shown_id(key.road)}", reason)
@@ -194,7 +193,7 @@ def _find_one_sided_links(odr: OpenDrive) -> Iterator[ReportEntry]:
         yield ReportEntry(ElementOutcome.REPAIRED, _describe_place(*here), reason)
 
 
-def _why_uncovered(odr: OpenDrive, table: RoadTable, row: int) -> str:
+def _why_uncovered(odr: OpenDrive, table: RoadTable, row: int, *, whole: bool) -> str:
     """Why a lane, or a part of it, has no SUMO lane."""
     key = table.lane_keys[row]
     lane = odr.roads[key.road].sections[key.section].lanes[key.lane]
@@ -207,9 +206,11 @@ def _why_uncovered(odr: OpenDrive, table: RoadTable, row: int) -> str:
         return f"it is {float(widths.max()):.2f} m wide at most"
     if float(widths.min()) < NO_WIDTH:
         return "its width falls to zero"
+    if not whole and lane_use(lane) in WALKABLE_TYPES:
+        return WALKING_AREA
     if odr.roads[key.road].junction is not None:
         return "no shortest connection between two lanes runs over it"
-    return "nothing leads there"
+    return "nothing leads there" if whole else "a junction and its crossings reach over it"
 
 
 def _find_access_entries(odr: OpenDrive) -> Iterator[ReportEntry]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.convert.model.access import BICYCLE_TYPES, is_used
+from odscen.convert.model.access import BICYCLE_TYPES, TRACK_TYPES, is_used
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.opendrive.road_model import DRIVABLE_TYPES
 
@@ -36,6 +36,7 @@ def lane_lengths(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> dict[str
             continue
         kind = "driving" if lane_type in DRIVABLE_TYPES else "walking"
         kind = "biking" if lane_type in BICYCLE_TYPES else kind
+        kind = "rail" if lane_type in TRACK_TYPES else kind
         where = "road" if odr.roads[key.road].junction is None else "junction"
         length = float(table.lane_s1[row] - table.lane_s0[row])
         for name, value in (("length", length), ("covered", covered.get(key, 0.0))):

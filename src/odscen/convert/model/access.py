@@ -12,6 +12,12 @@ if TYPE_CHECKING:
 
 BICYCLE_TYPES = frozenset({"biking"})
 
+TRACK_TYPES = {
+    "tram": frozenset({"tram"}),
+    "rail": frozenset({"rail", "rail_electric", "rail_fast", "rail_urban"}),
+}
+"""Classes on lanes for rail vehicles: no road user of a scenario, but some of a SUMO project."""
+
 PEDESTRIAN = frozenset({"pedestrian"})
 BICYCLE = frozenset({"bicycle"})
 
@@ -57,6 +63,8 @@ def allowed(lane_type: str) -> frozenset[str]:
     """
     if lane_type in BICYCLE_TYPES:
         return BICYCLE
+    if lane_type in TRACK_TYPES:
+        return TRACK_TYPES[lane_type]
     if lane_type in _RESERVED:
         return _RESERVED[lane_type]
     if lane_type in DRIVABLE_TYPES:
@@ -128,7 +136,7 @@ def vehicle_classes(lane: Lane, s: float) -> frozenset[str]:
 
 def is_used(lane_type: str) -> bool:
     """Whether lanes of a type become part of the network."""
-    return lane_type in DRIVABLE_TYPES | WALKABLE_TYPES | BICYCLE_TYPES
+    return lane_type in DRIVABLE_TYPES | WALKABLE_TYPES | BICYCLE_TYPES | TRACK_TYPES.keys()
 
 
 def speed(limit: float, lane_type: str, road_type: str) -> float:

@@ -324,7 +324,7 @@ class _SignalReach:
 
     def controls(self, place: Acting) -> list[int]:
         """Connections under a place of a signal or, on roads outside junctions, ahead of it."""
-        if self._odr.roads[place.road].junction is not None:
+        if self._is_in_junction(place.road):
             return _on_connecting(place, self._table, self._connections, self._over)
         found: list[int] = []
         for growing in (True, False):
@@ -336,6 +336,13 @@ class _SignalReach:
                 if place.applies_to(int(self._table.lane_id[last.row])):
                     found.append(number)
         return found
+
+    def _is_in_junction(self, road: RoadId) -> bool:
+        """Whether a road is a connecting one, or so short that its junctions have taken it up."""
+        if self._odr.roads[road].junction is not None:
+            return True
+        row = self._table.road_index[road]
+        return not any((row, growing) in self._by_road for growing in (True, False))
 
     def distance(self, place: Acting, *, growing: bool) -> float:
         """Metres to the next junction, whichever way the signal faces."""
