@@ -19,6 +19,7 @@ ALL = (
     "netconvert_maps",
     "capacity",
     "saturation",
+    "motion",
     "intervals",
     "weather",
     "signal_timing",

@@ -1802,7 +1802,7 @@ export interface components {
         Drivers: {
             saturation_flow: number | null;
             headway: number | null;
-            /** @default 0.3 */
+            /** @default 0.4 */
             gap_acceptance: number;
             /** @default 1 */
             lane_change_eagerness: number;
@@ -3675,7 +3675,7 @@ export interface components {
             environment: components["schemas"]["Environment"];
             /**
              * @default {
-             *       "gap_acceptance": 0.3,
+             *       "gap_acceptance": 0.4,
              *       "lane_change_eagerness": 1,
              *       "sets": [],
              *       "shares": {}

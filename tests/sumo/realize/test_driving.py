@@ -53,22 +53,23 @@ def test_a_normal_car_in_good_weather_has_the_documented_parameters() -> None:
     attributes = dict(made().attributes)
     assert attributes == {
         "vClass": "passenger", "guiShape": "passenger", "length": "5", "width": "1.8",
-        "height": "1.5", "maxSpeed": "55.56", "speedDev": "0", "accel": "2.6", "decel": "4.5",
-        "emergencyDecel": "9", "tau": "1.1", "sigma": "0", "minGap": "2", "impatience": "0.3",
-        "lcMaxSpeedLatStanding": "0.5", "lcMaxSpeedLatFactor": "0.3",
+        "height": "1.5", "maxSpeed": "55.56", "speedDev": "0", "accel": "2.6", "decel": "4",
+        "emergencyDecel": "9", "tau": "1.1", "sigma": "0", "minGap": "2", "impatience": "0.4",
+        "lcMaxSpeedLatStanding": "0.5", "lcMaxSpeedLatFactor": "0.3", "lcOvertakeRight": "1",
         "emissionClass": "HBEFA4/PC_petrol_Euro-4",
     }  # fmt: skip
 
 
 def test_what_a_scenario_says_of_its_drivers_is_set_for_all_styles() -> None:
-    drivers = Drivers(headway=2.0, gap_acceptance=0.4, lane_change_eagerness=0.5)
+    drivers = Drivers(headway=2.0, gap_acceptance=0.25, lane_change_eagerness=0.5)
     normal = dict(made(drivers=drivers).attributes)
-    assert (normal["tau"], normal["impatience"], normal["lcSpeedGain"]) == ("2", "0.4", "0.5")
+    assert (normal["tau"], normal["impatience"], normal["lcSpeedGain"]) == ("2", "0.25", "0.5")
     sporty = dict(made(drivers=drivers, style="sporty").attributes)
-    assert (sporty["tau"], sporty["impatience"]) == ("1.8", "0.6")
+    assert (sporty["tau"], sporty["impatience"]) == ("1.8", "0.45")
     cautious = dict(made(drivers=drivers, style="cautious").attributes)
-    assert (cautious["tau"], cautious["impatience"]) == ("3", "0.1")
-    assert "impatience" not in dict(made(style="cautious").attributes)
+    assert cautious["tau"] == "3"
+    assert "impatience" not in cautious
+    assert dict(made(style="cautious").attributes)["impatience"] == "0.1"
 
 
 LEARNERS = DriverSet(
@@ -269,7 +270,7 @@ def test_weather_acts_on_vehicles_and_not_on_walkers() -> None:
     wet, dry = made(weather=rain), made()
     assert wet.speed_factor == pytest.approx(dry.speed_factor * rain.speed, abs=1e-4)
     assert wet.max_speed == pytest.approx(rain.sight_speed)
-    assert float(dict(wet.attributes)["decel"]) == pytest.approx(4.5 * rain.grip)
+    assert float(dict(wet.attributes)["decel"]) == pytest.approx(4.0 * rain.grip)
     assert made(Category.PEDESTRIAN, weather=rain) == made(Category.PEDESTRIAN)
 
 

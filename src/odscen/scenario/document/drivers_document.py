@@ -67,7 +67,7 @@ class Drivers(Part):
 
     saturation_flow: Annotated[float, Field(ge=800, le=2500)] | None = None
     headway: Annotated[float, Field(ge=0.5, le=5)] | None = None
-    gap_acceptance: Annotated[float, Field(ge=0, le=1)] = 0.3
+    gap_acceptance: Annotated[float, Field(ge=0, le=1)] = 0.4
     lane_change_eagerness: Annotated[float, Field(ge=0, le=10)] = 1.0
     sets: tuple[DriverSet, ...] = ()
     shares: dict[Identifier, Annotated[float, Field(gt=0)]] = Field(default_factory=dict)
