@@ -14,8 +14,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-FAR = 1e6
-"""Metres: no map of the bench is so large."""
+FAR = 1e7
+"""Metres: no map of the bench is so large, or moved so far away."""
 
 
 def _no_constant(text: str) -> float:

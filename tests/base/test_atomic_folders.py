@@ -111,3 +111,12 @@ def test_what_a_killed_process_left_is_removed_by_the_next_one_and_what_lives_st
     code = "from odscen.base.atomic_folders import scratch_folder\nwith scratch_folder(): pass"
     subprocess.run([sys.executable, "-c", code], check=True)
     assert list(temporary.iterdir()) == []
+
+
+def test_without_any_temporary_folder_there_is_no_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_usable() -> str:
+        raise FileNotFoundError("No usable temporary directory found")
+
+    monkeypatch.setattr(tempfile, "gettempdir", none_usable)
+    with pytest.raises(FileNotFoundError, match="No usable"), scratch_folder():
+        pass

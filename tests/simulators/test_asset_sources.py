@@ -14,6 +14,7 @@ from starlette.testclient import TestClient
 import odscen
 from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.base.categories import Body
+from odscen.base.errors import WorkspaceError
 from odscen.carla.server.server_models import ServerModels
 from odscen.cli import main
 from odscen.maps.store import Workspace
@@ -100,6 +101,20 @@ def test_what_ships_what_was_fetched_and_a_carla_server_are_sources_alike(tmp_pa
     file.write_text(json.dumps({"blueprints": [row]}))
     (model,) = FetchedModels(file).models()
     assert assets.blueprint_row(model) == row
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("id", []), ("id", 7), ("category", "horse"), ("length", "4.5"), ("width", True), ("age", {})],
+)
+def test_a_row_of_another_kind_is_refused_with_its_field_or_value(
+    tmp_path: Path, field: str, value: object
+) -> None:
+    row = assets.blueprint_row(next(iter(assets.shipped_assets().blueprints.values())))
+    file = tmp_path / "blueprints.json"
+    file.write_text(json.dumps({"blueprints": [row | {field: value}]}))
+    with pytest.raises(WorkspaceError, match=f"{field} cannot be|'horse'"):
+        FetchedModels(file).models()
 
 
 def test_the_example_of_the_seam_runs() -> None:

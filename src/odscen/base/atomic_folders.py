@@ -72,6 +72,7 @@ def scratch_folder() -> Iterator[Path]:
     It lies in a folder that only its user can enter; what killed processes of that user have left
     there is removed by the next one, once.
     """
+    tempfile.gettempdir()  # outside of the loop: there may be none
     with ExitStack() as stack:
         while True:
             with suppress(FileNotFoundError):  # another process has just removed it

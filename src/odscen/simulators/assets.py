@@ -245,6 +245,13 @@ def _own_assets(source: AssetSource) -> Assets:
 
 
 BLUEPRINTS_FILE = "blueprints.json"
+_FIELD_KINDS: dict[str, tuple[type[object], ...]] = {
+    **dict.fromkeys(("id", "category", "base_type", "special_type", "dimensions_source"), (str,)),
+    **dict.fromkeys(("length", "width", "height"), (int, float)),
+    "generation": (int, type(None)),
+    "age": (str, type(None)),
+}
+"""What a row of that file has in each field."""
 
 
 def assets_in(folder: Path) -> Assets:
@@ -280,6 +287,11 @@ def blueprint_row(model: Blueprint) -> dict[str, Any]:
 
 
 def _read_blueprint(row: Mapping[str, Any]) -> Blueprint:
+    """Inverse of :func:`blueprint_row`; ``TypeError`` if a field has a value of another kind."""
+    for name, kinds in _FIELD_KINDS.items():
+        value = row.get(name)
+        if not isinstance(value, kinds) or isinstance(value, bool):
+            raise TypeError(f"{name} cannot be {json.dumps(value)[:40]}")
     return Blueprint(
         id=row["id"],
         category=Category(row["category"]),

@@ -2,9 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from odscen.base.errors import ScenarioError
-from odscen.scenario.document.distributions import Uniform, draw_place
+from odscen.scenario.document.distributions import Uniform, WrittenDistribution, draw_place
 from odscen.scenario.document.sampling_config import loads_config
 
 
@@ -40,3 +41,18 @@ def test_weights_whose_sum_is_no_number_are_refused_where_they_are_read(text: st
     with pytest.raises(ScenarioError) as refused:
         loads_config(text, file="c.toml")
     assert "is no number" in " ".join(refused.value.problems)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "3.5",
+        '{"kind":"uniform","low":1.0,"high":2.0}',
+        '{"kind":"normal","mean":1.5,"std":0.5,"low":1.0,"high":2.0}',
+        '{"kind":"choice","values":[1.0]}',
+        '{"kind":"choice","values":[1.0,2.0],"weights":[3.0,1.0]}',
+    ],
+)
+def test_what_is_written_of_a_distribution_is_read_as_strictly_as_documents_are(text: str) -> None:
+    kinds: TypeAdapter[object] = TypeAdapter(WrittenDistribution)
+    assert kinds.dump_json(kinds.validate_json(text, strict=True)).decode() == text

@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import psutil
 import pytest
 
 from odscen.runs import layout
-from odscen.sumo.runner import forked_worker
+from odscen.runs.reporter import Progress
+from odscen.sumo.runner import forked_worker, worker_process
 from odscen.sumo.runner.left_results import left_results
 from odscen.sumo.runner.run_jobs import run_prepared
 from odscen.sumo.runner.worker_process import run_worker
@@ -102,6 +104,35 @@ def test_a_crash_of_sumo_ends_one_run_and_leaves_the_next_alone(
     assert "SIGSEGV" in ended.error
     assert made(prepare, tmp_path / "after", forked=True) == good
     assert server_pid() == before
+
+
+def test_a_worker_that_hangs_when_its_run_is_called_off_is_killed(
+    prepare: Prepare, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker_process, "SILENT_FOR", 0.5)
+    prepare().write(tmp_path)
+    stopped: list[psutil.Process] = []
+
+    def stop_worker() -> bool:
+        if not stopped:
+            stopped.extend(
+                child
+                for child in psutil.Process().children()
+                if worker_process.WORKER in child.cmdline()
+            )
+            for child in stopped:
+                child.suspend()
+        return bool(stopped)
+
+    class CalledOffError(Exception):
+        pass
+
+    def progress(_: Progress) -> None:
+        raise CalledOffError
+
+    with pytest.raises(CalledOffError):
+        run_worker(tmp_path, progress=progress, called_off=stop_worker)
+    assert not stopped[0].is_running()
 
 
 @pytest.mark.slow

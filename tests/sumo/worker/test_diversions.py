@@ -121,6 +121,23 @@ def test_nobody_enters_a_closed_road_and_the_parallel_roads_get_more(
     assert shut.summary["actors"]["stranded"] == 0
 
 
+def test_a_closure_between_two_steps_ends_as_well(
+    workspace: Workspace, town: LoadedMap, tmp_path: Path
+) -> None:
+    car = {"id": "late", "category": "car", "spawn": "15.0.-1.10", "goal": "25.0.-1.30"}
+    closed = {"id": "shut", "kind": "closure", "begin": 0.0, "end": 20.2, "places": ["r25"]}
+    short = {"id": "short", "kind": "closure", "begin": 0.0, "end": 0.1, "places": ["r13"]}
+    one = scenario(
+        town,
+        actors=[car | {"depart": 40.0}],
+        measures=[closed, short],
+        simulation={"duration": 300.0, "step_length": 0.5},
+    )
+    run = Ended(workspace, one, tmp_path, time_limit=60.0)
+    assert run.outcomes["late"].status.value == "arrived"
+    assert run.summary["actors"]["stranded"] == 0
+
+
 def test_who_is_bound_for_a_closed_road_is_stranded_and_counted(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:

@@ -108,6 +108,11 @@ class Choice(Part):
 def _from_number(value: Any) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return {"kind": "constant", "value": value}
+    if isinstance(value, dict):
+        # Read strictly, an array of JSON is a tuple, but not once Python has had it in its hands.
+        return {
+            name: tuple(part) if isinstance(part, list) else part for name, part in value.items()
+        }
     return value
 
 

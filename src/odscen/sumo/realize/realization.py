@@ -148,7 +148,7 @@ def realize(
     )
     for vehicle in breakdowns(scenario, sumo_map, until=until):
         demand.add_breakdown(vehicle)
-    actions = measure_actions(scenario, sumo_map, until=until)
+    actions = measure_actions(scenario, sumo_map, until=until, step_length=step_length)
     stops = stop_places(scenario, sumo_map)
     parks = scenario.demand.parking.used
     areas = parking_positions(sumo_map, region.lanes) if parks else {}

@@ -165,7 +165,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
         "input": inputs,
         "output": _output_options(settings),
         "time": {
-            "begin": f"{settings.begin:g}",
+            "begin": f"{settings.begin:.10g}",
             "end": f"{settings.until:g}",
             "step-length": f"{settings.step_length:g}",
         },

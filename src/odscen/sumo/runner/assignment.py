@@ -205,7 +205,9 @@ class _Search:
         self._until, self._interval, self._spread = until, choice.interval, choice.spread
         self._lanes = sumo_map.graph.lanes
         self._network = TimedNetwork(sumo_map)
-        self._closings = measure_actions(scenario, sumo_map, until=until).closings
+        step_length = scenario.simulation.step_length
+        actions = measure_actions(scenario, sumo_map, until=until, step_length=step_length)
+        self._closings = actions.closings
         self._edges = EdgeSteps(self._lanes)
         self._drivable = region.router_over(sumo_map.drivable)
         routes = RoutesOfDemand(scenario, region, self._drivable)

@@ -169,6 +169,7 @@ def _resume_from(
     ended = run_worker(
         folder,
         progress=reporter.advanced,
+        called_off=lambda: reporter.cancelled,
         time_limit=limit,
         live=live,
         keep=(lock,),

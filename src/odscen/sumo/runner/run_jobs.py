@@ -92,6 +92,7 @@ def simulate(
     outcome = run_worker(
         folder,
         progress=reporter.advanced,
+        called_off=lambda: reporter.cancelled,
         time_limit=prepared.settings.time_limit,
         live=live,
         keep=keep,

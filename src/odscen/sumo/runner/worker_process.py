@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from odscen.sumo.worker.protocol import Left, Lockstep, Message, Pace
 
 WORKER = "odscen.sumo.worker.simulate"
+SILENT_FOR = 5.0
+"""Wall seconds in which a worker that is called off may say nothing."""
 
 
 class Companion(Protocol):
@@ -76,6 +78,7 @@ def run_worker(
     keep: tuple[int, ...] = (),
     forked: bool = False,
     results: Callable[[Left], None] | None = None,
+    called_off: Callable[[], bool] = lambda: False,
 ) -> SimulationOutcome:
     """Run the simulation prepared in ``folder``.
 
@@ -100,6 +103,10 @@ def run_worker(
     results
         Makes the results of a small run from what a forked process has left: to that, all that
         Python does is dear, and the first table costs as much as the simulation.
+    called_off
+        Whether it is to end before its time: a worker that says nothing for :data:`SILENT_FOR`
+        seconds after that, as SUMO may be in a step that does not end, is killed. ``progress`` is
+        called once more then.
     """
     start = time.perf_counter()
     late = threading.Event()
@@ -116,16 +123,19 @@ def run_worker(
         ) as process,
     ):
         timer = _kill_after(process, time_limit, late)
+        watch = _SilenceWatch(process, called_off)
+        watch.start()
         try:
             if results is not None:
                 import polars as pl  # its import takes longer than a short simulation
 
                 del pl
-            last = _follow_process(process, progress, live)
+            last = _follow_process(process, progress, live, watch)
         except BaseException:  # an interrupt, or the caller's progress function
             _kill_process(process)
             raise
         finally:
+            watch.ended.set()
             if timer is not None:
                 timer.cancel()
             if live is not None:
@@ -142,6 +152,9 @@ def run_worker(
             stopped=last.stopped,
             work_seconds=last.wall_seconds,
         )
+    if watch.killed:
+        words = "SUMO was in a step that did not end when the run was called off, and was killed"
+        return SimulationOutcome(None, None, seconds, error=words)
     if late.is_set():
         words = f"stopped after the time limit of {time_limit:g} s"
         return SimulationOutcome(None, None, seconds, error=words)
@@ -200,18 +213,24 @@ def _follow_process(
     process: subprocess.Popen[bytes] | ForkedWorker,
     progress: Callable[[Progress], None] | None,
     live: Companion | None,
+    watch: _SilenceWatch,
 ) -> Done | Failed | None:
     """Pass on what the worker says; return the last thing it said of its end."""
     last: Done | Failed | None = None
+    so_far = Progress(0.0, 0.0, running=0, departed=0, arrived=0, planned=0)
     if live is not None and not isinstance(process, ForkedWorker):
         live.attach(process)
     for message, payload in messages(process):
+        watch.heard = time.monotonic()
         if live is not None:
             live.take(message, payload)
         if isinstance(message, Progress) and progress is not None:
+            so_far = message
             progress(message)
         elif isinstance(message, Done | Failed):
             last = message
+    if watch.killed and progress is not None:
+        progress(so_far)  # where who has called it off raises
     return last
 
 
@@ -252,6 +271,31 @@ def _kill_after(
     timer.daemon = True
     timer.start()
     return timer
+
+
+class _SilenceWatch(threading.Thread):
+    """Kills a worker that is called off and does not hear of it."""
+
+    def __init__(
+        self, process: subprocess.Popen[bytes] | ForkedWorker, called_off: Callable[[], bool]
+    ) -> None:
+        super().__init__(daemon=True)
+        self._process, self._called_off = process, called_off
+        self.heard = time.monotonic()
+        self.ended = threading.Event()
+        self.killed = False
+
+    def run(self) -> None:
+        since: float | None = None
+        while not self.ended.wait(SILENT_FOR / 10.0):
+            if not self._called_off():
+                since = None
+                continue
+            since = since or time.monotonic()
+            if time.monotonic() - max(since, self.heard) > SILENT_FOR:
+                self.killed = True
+                _kill_process(self._process)
+                return
 
 
 def _kill_process(process: subprocess.Popen[bytes] | ForkedWorker) -> None:

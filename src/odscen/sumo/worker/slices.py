@@ -147,7 +147,7 @@ class _RunningSlice:
         arguments += outputs_to(part, sumo)
         if self._before is not None:
             state = slice_folder(self._run, self._before.number) / STATE_FILE
-            arguments += ["--load-state", str(state), "--begin", f"{self._before.time:g}"]
+            arguments += ["--load-state", str(state), "--begin", f"{self._before.time:.10g}"]
         return arguments
 
     def _compare_restored(self, session: Session, stepper: Stepper) -> None:

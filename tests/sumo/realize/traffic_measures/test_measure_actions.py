@@ -36,7 +36,7 @@ def scenario(town: LoadedMap, *measures: dict[str, Any]) -> Scenario:
 
 
 def actions(town: LoadedMap, *measures: dict[str, Any], until: float = 600.0) -> MeasureActions:
-    return measure_actions(scenario(town, *measures), town.sumo, until=until)
+    return measure_actions(scenario(town, *measures), town.sumo, until=until, step_length=0.5)
 
 
 def xml(one: MeasureActions) -> etree._Element:
@@ -67,6 +67,22 @@ def test_a_closed_road_is_closed_where_one_enters_it_and_stays_open_for_who_is_o
     assert [(one.begin, one.end) for one in cars] == [(60.0, 120.0)]
     assert all(target.rsplit(".", 1)[0] in own for _, target in cars[0].pairs)
     assert all(source.rsplit(".", 1)[0] not in own for source, _ in cars[0].pairs)
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "written"),
+    [
+        (0.0, 0.1, ("0", "0.5")),
+        (10.3, 20.7, ("10.5", "20.5")),
+        (100800.5, 172800.5, ("100800.5", "172800.5")),
+    ],
+)
+def test_closures_begin_and_end_with_a_step(
+    town: LoadedMap, begin: float, end: float, written: tuple[str, str]
+) -> None:
+    closure = {"kind": "closure", "places": ["r25"], "begin": begin, "end": end}
+    (interval,) = xml(actions(town, closure, until=1e6)).iter("interval")
+    assert (interval.get("begin"), interval.get("end")) == written
 
 
 def test_a_closed_lane_is_closed_itself_and_only_for_those_who_are_banned(town: LoadedMap) -> None:

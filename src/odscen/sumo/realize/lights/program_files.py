@@ -118,7 +118,7 @@ def _switches_xml(light: RealizedLight) -> Iterator[str]:
     name = light.shown.id
     yield f'    <WAUT id="plans.{name}" refTime="0" startProg="{light.switches[0][1]}">'
     for time, program in light.switches[1:]:
-        yield f'        <wautSwitch time="{time:g}" to="{program}"/>'
+        yield f'        <wautSwitch time="{time:.10g}" to="{program}"/>'
     yield "    </WAUT>"
     # Plans wait for a stage that both have; a light that fails does so at once.
     procedure = "" if outage else ' procedure="GSP" synchron="true"'

@@ -139,8 +139,12 @@ class MeasureActions:
         return {lane for closing in self.closings for lane in closing.lanes}
 
 
-def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> MeasureActions:
+def measure_actions(
+    scenario: Scenario, sumo_map: SumoMap, *, until: float, step_length: float
+) -> MeasureActions:
     """Work out what the measures of a scenario do in a run of ``until`` seconds.
+
+    Closures begin and end with a step in SUMO, the nearest, and take at least one.
 
     Raises
     ------
@@ -164,7 +168,10 @@ def measure_actions(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> M
         if isinstance(measure, RoadClosure | Roadworks | ChangedPermission)
         and closed_places(measure)
     ]
-    lines = [*_rerouter_lines(closings, found), *_speed_sign_lines(active, found, until)]
+    lines = [
+        *_rerouter_lines(closings, found, step_length),
+        *_speed_sign_lines(active, found, until),
+    ]
     xml = "\n".join(["<additional>", *lines, "</additional>", ""]) if lines else None
     planned = sorted(
         (_plan_measure(measure, found, sumo_map, until) for measure in active), key=_begin_and_id
@@ -200,13 +207,20 @@ def _begin_and_id(measure: PlannedMeasure) -> tuple[float, str]:
     return measure.begin, measure.id
 
 
-def _rerouter_lines(closings: Sequence[ClosedLanes], found: MeasuredLanes) -> Iterator[str]:
+def _rerouter_lines(
+    closings: Sequence[ClosedLanes], found: MeasuredLanes, step_length: float
+) -> Iterator[str]:
     for closing in closings:
         if not closing.lanes:
             continue
         edges = " ".join(found.predecessors(closing.lanes))
         yield f"    <rerouter id={quoteattr(f'closed.{closing.id}')} edges={quoteattr(edges)}>"
-        yield f'        <interval begin="{closing.begin:g}" end="{closing.end:g}">'
+        # SUMO compares these with the time of a step: between two it never opens again, and before
+        # the second it does not get on at all.
+        first = round(closing.begin / step_length)
+        last = max(first + 1, round(closing.end / step_length))
+        begin, end = first * step_length, last * step_length
+        yield f'        <interval begin="{begin:.10g}" end="{end:.10g}">'
         for name in closing.lanes:
             who = _remaining_permission(found.net.lanes[name], closing.banned)
             yield f"            <closingLaneReroute id={quoteattr(name)} {who}/>"
@@ -231,7 +245,9 @@ def _speed_sign_lines(
         alike.setdefault(_limit_steps(spans, until), []).append(lane)
     for number, (steps, lanes) in enumerate(alike.items()):
         yield f'    <variableSpeedSign id="limit.{number}" lanes={quoteattr(" ".join(lanes))}>'
-        yield from (f'        <step time="{time:g}" speed="{speed:g}"/>' for time, speed in steps)
+        yield from (
+            f'        <step time="{time:.10g}" speed="{speed:g}"/>' for time, speed in steps
+        )
         yield "    </variableSpeedSign>"
 
 
