@@ -19,7 +19,7 @@ def test_plain_ids_are_shown_as_they_are(plain: str) -> None:
         ("\u202eabc", "'\\u202eabc'"),
         ("a\nb", "'a\\nb'"),
         ("", "''"),
-        ("y" * 80, repr("y" * 57 + "...")),
+        ("y" * 60 + "z" * 20, repr("y" * 37 + "..." + "z" * 20)),
     ],
 )
 def test_other_ids_are_quoted_and_what_cannot_be_seen_is_escaped(odd: str, expected: str) -> None:

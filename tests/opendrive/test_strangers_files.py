@@ -354,6 +354,137 @@ def test_a_lane_link_that_one_side_states_is_kept_and_reported(stated: str) -> N
     )
 
 
+PREDECESSOR, SUCCESSOR = LINK.format("predecessor", 1, "end"), LINK.format("successor", 2, "start")
+INNER = road(
+    "7",
+    length=20.0,
+    plan=line(100.0, 20.0),
+    lanes=ALONG,
+    junction="5",
+    link=LINK.format("predecessor", "1", "end") + LINK.format("successor", "2", "start"),
+)
+TO_JUNCTION = '<{} elementType="junction" elementId="5"/>'
+LEGS = (
+    road("1", lanes=ALONG, link=TO_JUNCTION.format("successor")),
+    road("2", plan=line(120.0, 100.0), lanes=ALONG, link=TO_JUNCTION.format("predecessor")),
+)
+
+
+def connection(number: int, road_id: str, contact: str, links: str) -> str:
+    return (
+        f'<connection id="{number}" incomingRoad="{road_id}" connectingRoad="7" '
+        f'contactPoint="{contact}">{links}</connection>'
+    )
+
+
+THERE = connection(0, "1", "start", '<laneLink from="-1" to="-1"/>')
+BACK = connection(1, "2", "end", '<laneLink from="1" to="1"/>')
+BARE = connection(0, "1", "start", "") + connection(1, "2", "end", "")
+BOTH_WAYS = {"12", "21"}
+
+# Roads and what is in the junction, with the ways that traffic has between roads 1 and 2.
+ONE_SIDED: dict[str, tuple[tuple[str, ...], str | None, set[str]]] = {
+    "both say it": (tuple(chain(100.0, 100.0)), None, BOTH_WAYS),
+    "the road behind alone": (
+        (chain(100.0, 100.0)[0].replace(SUCCESSOR, ""), chain(100.0, 100.0)[1]),
+        None,
+        BOTH_WAYS,
+    ),
+    "the road before alone": (
+        (chain(100.0, 100.0)[0], chain(100.0, 100.0)[1].replace(PREDECESSOR, "")),
+        None,
+        BOTH_WAYS,
+    ),
+    "no road": (
+        (
+            chain(100.0, 100.0)[0].replace(SUCCESSOR, ""),
+            chain(100.0, 100.0)[1].replace(PREDECESSOR, ""),
+        ),
+        None,
+        set(),
+    ),
+    "roads, and no lane": (
+        tuple(
+            one.replace(BOTH_LINKS.format(1), "").replace(BOTH_LINKS.format(-1), "")
+            for one in chain(100.0, 100.0)
+        ),
+        None,
+        BOTH_WAYS,
+    ),
+    "a junction": ((*LEGS, INNER), THERE + BACK, BOTH_WAYS),
+    "one connection of two": ((*LEGS, INNER), THERE, BOTH_WAYS),
+    "connections without lanes": ((*LEGS, INNER), BARE, BOTH_WAYS),
+    "a junction without connections": ((*LEGS, INNER), "", BOTH_WAYS),
+    "the junction alone": (
+        (*(one.replace(' elementId="5"', ' elementId="99"') for one in LEGS), INNER),
+        THERE + BACK,
+        BOTH_WAYS,
+    ),
+    "lanes of the leg's side alone": (
+        (*LEGS, INNER.replace(BOTH_LINKS.format(1), "").replace(BOTH_LINKS.format(-1), "")),
+        THERE + BACK,
+        BOTH_WAYS,
+    ),
+    "the table alone": (
+        (*LEGS, INNER.replace(PREDECESSOR, "").replace(SUCCESSOR, "")),
+        THERE + BACK,
+        BOTH_WAYS,
+    ),
+    "the other end": ((*LEGS, INNER), THERE.replace('"start"', '"end"') + BACK, BOTH_WAYS),
+}
+
+
+@pytest.mark.parametrize("stated", ONE_SIDED)
+def test_ways_are_there_whichever_side_states_them(stated: str) -> None:
+    roads, inside, ways = ONE_SIDED[stated]
+    table = () if inside is None else (f'<junction id="5">{inside}</junction>',)
+    odr = parse(document(*roads, *table))
+    followers = lane_successors(odr)
+    found = {
+        f"{here.road}{last.road}"
+        for here, nexts in followers.items()
+        if here.road != "7"
+        for there in nexts
+        for last in ([there] if there.road != "7" else followers[there])
+    }
+    assert found == ways
+    if stated in ("both say it", "a junction", "no road"):
+        assert odr.notes == ()
+    else:
+        assert odr.notes
+
+
+def test_a_road_end_that_two_others_link_to_is_left_as_it_is() -> None:
+    first, last = chain(100.0, 100.0)
+    other = last.replace('road id="2"', 'road id="3"').replace('y="0.0"', 'y="9.0"')
+    odr = parse(document(first.replace(SUCCESSOR, ""), last, other))
+    assert odr.roads[RoadId("1")].successor is None
+
+
+def test_sections_whose_lanes_say_nothing_and_differ_are_told() -> None:
+    more = section(lane(-1), lane(-2)) + section(lane(-1), s=50)
+    odr = parse(document(road(lanes=more)))
+    assert rules(odr) == ["connection-left-out"]
+    assert "they end here" in odr.notes[0]
+    same = parse(document(road(lanes=section(lane(-1)) + section(lane(-1), s=50))))
+    assert rules(same) == ["silent-lanes"]
+    assert same.roads[RoadId("1")].sections[0].lanes[-1].successors == (-1,)
+    assert same.roads[RoadId("1")].sections[1].lanes[-1].predecessors == (-1,)
+
+
+def test_a_direct_junction_that_links_no_lanes_is_told() -> None:
+    after = LEGS[1].replace('x="120.0"', 'x="100.0"')
+    direct = (
+        '<junction id="5" type="direct"><connection id="0" incomingRoad="1" linkedRoad="2" '
+        'contactPoint="start">{}</connection></junction>'
+    )
+    bare = parse(document(LEGS[0], after, direct.format("")))
+    assert rules(bare) == ["connection-left-out"]
+    full = parse(document(LEGS[0], after, direct.format('<laneLink from="-1" to="-1"/>')))
+    assert rules(full) == []
+    assert lane_successors(full)[LaneKey(RoadId("1"), 0, -1)] == (LaneKey(RoadId("2"), 0, -1),)
+
+
 def test_a_lane_that_names_another_follower_is_taken_at_its_word() -> None:
     wide = section(lane(-1, inside='<link><predecessor id="-1"/></link>'), lane(-2), s=50)
     split = wide.replace(

@@ -177,7 +177,8 @@ def mark(s: float, kind: str) -> str:
 
 def test_road_marks_in_any_order_hold_from_their_offset_to_the_next() -> None:
     marks = mark(60, "solid") + mark(0, "broken") + mark(30, "none")
-    lanes = section(lane(-1)) + section(lane(-1, inside=marks), s=10)
+    behind = '<link><predecessor id="-1"/></link>'
+    lanes = section(lane(-1)) + section(lane(-1, inside=behind + marks), s=10)
     odr = parse(document(road(lanes=lanes)))
     found = odr.roads[RoadId("1")].sections[1].lanes[-1].road_marks
     assert [(one.s, one.type) for one in found] == [(10, "broken"), (40, "none"), (70, "solid")]
@@ -331,8 +332,9 @@ def test_control_characters_of_ids_are_spaces_wherever_they_are_named() -> None:
     ahead = geometry(0, 100, x=100.0)
     link = '<{} elementType="road" elementId="{}" contactPoint="{}"/>'
     odd = xml("a\tb\n\x85")
-    first = road(odd, link=link.format("successor", "2", "start"))
-    last = road("2", plan=ahead, link=link.format("predecessor", odd, "end"))
+    alone = {"lanes": section(lane(-1, inside='<link><predecessor id="-1"/></link>'))}
+    first = road(odd, link=link.format("successor", "2", "start"), **alone)
+    last = road("2", plan=ahead, link=link.format("predecessor", odd, "end"), **alone)
     odr = parse(document(first, last))
     assert list(odr.roads) == ["a b  ", "2"]
     back = odr.roads[RoadId("2")].predecessor

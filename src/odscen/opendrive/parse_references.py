@@ -9,6 +9,7 @@ from odscen.base.ids import JunctionId, RoadId
 from odscen.base.shown import shown_id
 from odscen.opendrive.parse_rules import S_TOLERANCE, Notes, Rule
 from odscen.opendrive.road_model import (
+    DRIVABLE_TYPES,
     Connection,
     ContactPoint,
     Controller,
@@ -38,6 +39,7 @@ def check_references(
     roads = {
         key: _check_road(road, roads, junctions, signals, notes) for key, road in roads.items()
     }
+    roads = _join_silent_lanes(_link_back(roads, notes), notes)
     for road in roads.values():
         _note_lane_links(road, roads, notes)
         _note_places(road, notes)
@@ -137,6 +139,86 @@ def _check_road(
     return replace(road, **changes) if changes else road  # type: ignore[arg-type]
 
 
+def _link_back(roads: Roads, notes: Notes) -> Roads:
+    """The roads, each end without a link with that to the only road end that links to it."""
+    linking: dict[tuple[str, str], list[tuple[RoadId, ContactPoint]]] = {}
+    for road in roads.values():
+        ends: tuple[tuple[ContactPoint, RoadLink | None], ...] = (
+            ("start", road.predecessor),
+            ("end", road.successor),
+        )
+        for end, link in ends:
+            if link is not None and link.element_type == "road" and link.contact_point:
+                linking.setdefault((link.element_id, link.contact_point), []).append((road.id, end))
+    changed = dict(roads)
+    for (name, at), others in linking.items():
+        road = changed[RoadId(name)]
+        field = "predecessor" if at == "start" else "successor"
+        if getattr(road, field) is not None or len(others) > 1 or others[0][0] == road.id:
+            continue
+        other, contact = others[0]
+        link = RoadLink("road", other, contact)
+        changed[road.id] = replace(road, **{field: link})  # type: ignore[arg-type]
+        detail = f"no link, but the {contact} of road {shown_id(other)} links here: linked back"
+        notes.add(Rule.ONE_SIDED_LINK, f"road {shown_id(road.id)} > {field}", detail)
+    return changed
+
+
+def _join_silent_lanes(roads: Roads, notes: Notes) -> Roads:
+    """Link lanes by their ids where sections follow each other and no lane of a side says how."""
+    links: dict[tuple[RoadId, int, int, str], int] = {}
+    for road in roads.values():
+        for number, section in enumerate(road.sections):
+            for field, step, link in (
+                ("successors", 1, road.successor),
+                ("predecessors", -1, road.predecessor),
+            ):
+                target = _next_section(road, number, link, roads, step)
+                if target is None or section.s_end <= section.s or target.s_end <= target.s:
+                    continue
+                inside = 0 <= number + step < len(road.sections)
+                if not inside and link is not None:
+                    beyond = roads[RoadId(link.element_id)]
+                    if road.junction is not None or beyond.junction is not None:
+                        continue  # there the junction's table says it, or else geometry
+                at_start = step > 0
+                if not inside and link is not None:
+                    at_start = link.contact_point == "start"
+                back = "predecessors" if at_start else "successors"
+                flip = 1 if back != field else -1
+                for side in (1, -1):
+                    ids = _silent_lanes(section, side, field)
+                    there = [flip * n for n in _silent_lanes(target, flip * side, back)]
+                    if not ids or not there:
+                        continue
+                    rule, what = Rule.CONNECTION_LEFT_OUT, "whose ids are others: they end here"
+                    if ids == there:
+                        links |= {(road.id, number, n, field): flip * n for n in ids}
+                        rule, what = Rule.SILENT_LANES, "and are linked by their ids"
+                    if step > 0 or not inside:
+                        where = f"road {shown_id(road.id)} > laneSection {number}"
+                        name = "left" if side > 0 else "right"
+                        detail = f"lanes on the {name} name no {field}, nor do those there, {what}"
+                        notes.add(rule, where, detail)
+    changed = dict(roads)
+    for (road_id, number, lane_id, field), to in links.items():
+        road = changed[road_id]
+        sections = list(road.sections)
+        lanes = dict(sections[number].lanes)
+        lanes[lane_id] = replace(lanes[lane_id], **{field: (to,)})  # type: ignore[arg-type]
+        sections[number] = replace(sections[number], lanes=lanes)
+        changed[road_id] = replace(road, sections=tuple(sections))
+    return changed
+
+
+def _silent_lanes(section: LaneSection, side: int, field: str) -> list[int]:
+    """Lanes for driving on a side of a section, if none of that side names others there."""
+    lanes = [lane for lane in section.lanes.values() if lane.id * side > 0]
+    if any(getattr(lane, field) for lane in lanes):
+        return []
+    return sorted((n.id for n in lanes if n.type in DRIVABLE_TYPES), key=abs)
+
+
 def _next_section(
     road: Road, number: int, link: RoadLink | None, roads: Roads, step: int
 ) -> LaneSection | None:
@@ -208,6 +290,9 @@ def _check_connections(junction: Junction, roads: Roads, notes: Notes) -> Iterat
         if missing:
             detail = f"there is no road {missing[0]!r}; the connection is left out"
             notes.add(Rule.DANGLING_LINK, place, detail)
+            continue
+        if junction.type == "direct" and not connection.lane_links:
+            notes.add(Rule.CONNECTION_LEFT_OUT, place, "it links no lanes; it is left out")
             continue
         incoming, connecting = (roads[road_id] for road_id in ends)
         contact = 0 if connection.contact_point == "start" else -1

@@ -35,6 +35,11 @@ class Rule(StrEnum):
     MISSING_CONTACT = "missing-contact-point"
     """A link or connection without ``contactPoint`` means the end of the other road that links
     back; where none or both do it is left out, for which end it means is not guessed."""
+    ONE_SIDED_LINK = "one-sided-link"
+    """A road end without a link has one to the road end that links to it, if exactly one does."""
+    SILENT_LANES = "silent-lanes"
+    """Where a section follows, or a linked road outside junctions, and no lane of a side names any
+    there, on neither of both, and both have lanes for driving of the same ids, these are linked."""
     DUPLICATE_ID = "duplicate-id"
     """Objects and signals may share an id; references mean the first."""
     REPEATED_CONTROLLER = "repeated-controller"

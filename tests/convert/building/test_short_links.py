@@ -80,12 +80,22 @@ def two_junctions(
         (17.0, (2.5, 8.5, 14.5)),
         (20.0, (2.5, 17.5)),
         (11.0, ()),
+        (7.0, (1.6, 5.4)),
+        (8.0, (2.0, 6.0)),
+        (10.0, (2.0, 8.0)),
+        (11.0, (0.5, 10.5)),
+        (11.0, (-1.0, 12.0)),
+        (12.0, (2.0, 10.0)),
+        (13.0, (2.5, 10.5)),
+        (15.0, (3.0, 12.0)),
+        (18.0, (2.5, 15.5)),
     ],
 )
+@pytest.mark.parametrize("deep", [2.0, 3.0])
 def test_a_short_road_with_crosswalks_at_both_ends_keeps_its_junctions_and_lights(
-    length: float, crosswalks: tuple[float, ...]
+    length: float, crosswalks: tuple[float, ...], deep: float
 ) -> None:
-    network = two_junctions(length, crosswalks)
+    network = two_junctions(length, crosswalks, deep=deep)
     between = [
         one
         for one in network.table.edges.values()
