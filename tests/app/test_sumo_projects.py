@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import shutil
 import subprocess
 from collections import Counter
 from pathlib import Path
@@ -31,6 +33,9 @@ from odscen.scenario.document.sumo_document import SumoFile
 from odscen.sumo.realize.project_files import _made_harmless, allowed_options
 
 BIN = Path(sumo.SUMO_HOME) / "bin"
+PROJECTS = Path(
+    os.environ.get("ODSCEN_TEST_PROJECTS", Path(__file__).parents[3] / "shared" / "projects")
+)
 CONFIG = """<sumoConfiguration><input><net-file value="grid.net.xml"/>
 <route-files value="sub/cars.rou.xml,people.rou.xml"/><additional value="things.add.xml"/></input>
 <output><summary-output value="/tmp/summary.xml"/></output>
@@ -259,8 +264,28 @@ def test_the_run_is_that_of_sumo_alone(finished: Run, original: Original) -> Non
     assert {"p1", "p2", "bus", "t1"} <= rows.keys()
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(not PROJECTS.is_dir(), reason="projects of others are not here")
+def test_bologna_runs_as_sumo_runs_it_with_its_seven_programs(
+    store: Workspace, tmp_path: Path
+) -> None:
+    shutil.copytree(PROJECTS / "acosta", tmp_path / "acosta")
+    config = tmp_path / "acosta" / "run.sumocfg"
+    files = etree.parse(config).find("input/additional-files").get("value").split(",")
+    settings = tmp_path / "acosta" / "settings.gui.xml"
+    settings.write_text("<viewsettings/>")  # which the configuration names, and nobody has
+    alone = run_of_sumo(tmp_path / "acosta", config.name, *files, net="acosta_buslanes.net.xml")
+    assert len(alone.lights) == 7
+    made = import_file(store, config)
+    assert made.scenario is not None
+    done = run(store, made.scenario, name="bologna")
+    assert_agrees(done, alone)
+    assert not done.events().filter(pl.col("kind") == "route_changed").height
+
+
 def test_nothing_is_written_outside_the_run(finished: Run) -> None:
-    assert (finished.folder / "loops.xml").is_file()
+    for name in ("loops.xml", "e2.xml", "cal.xml"):
+        assert (finished.folder / name).is_file(), name
     assert not Path("/tmp/summary.xml").exists()
 
 

@@ -33,7 +33,12 @@ def net(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def drive(
-    net: Path, folder: Path, *, lane: int, closed: frozenset[tuple[str, str]] = frozenset()
+    net: Path,
+    folder: Path,
+    *,
+    lane: int,
+    closed: frozenset[tuple[str, str]] = frozenset(),
+    only: frozenset[str] | None = None,
 ) -> tuple[list[Event], float, bool]:
     """A car at a stop line that is to turn left; events, when it is gone, whether it arrived."""
     routes = folder / "routes.xml"
@@ -41,7 +46,7 @@ def drive(
         '<routes><vType id="car"/><vehicle id="a" type="car" depart="0" departPos="5"'
         f' departLane="{lane}"><route edges="10.2.f 8.2.b 8.1.b"/></vehicle></routes>'
     )
-    missed, events = MissedLanes((0.0, 0.0)), []
+    missed, events = MissedLanes((0.0, 0.0), only), []
     arguments = ["-n", str(net), "-r", str(routes), "--step-length", "0.5", "--no-warnings",
                  "--no-step-log", "--time-to-teleport", "-1"]  # fmt: skip
     with open_session(arguments) as session:
@@ -85,3 +90,8 @@ def test_the_time_of_a_route_is_that_of_its_links_in_free_flow() -> None:
     found = Detours([LaneLink("a", "b", 3.0, cars), LaneLink("a", "b", 2.5, cars),
                      LaneLink("b", "c", 4.0, cars)])  # fmt: skip
     assert found.seconds(("a", "b", "c"), "passenger") == 6.5
+
+
+def test_who_is_of_a_sumo_project_stays_as_in_sumo(net: Path, tmp_path: Path) -> None:
+    events, _, arrived = drive(net, tmp_path, lane=0, only=frozenset({"b"}))
+    assert (events, arrived) == ([], False)

@@ -67,6 +67,7 @@ def line_crossings(
         .join_asof(
             rears.select("line", "place", "id", "time", rear="time").sort("time"),
             on="time", by=("line", "place", "id"), strategy="forward",
+            check_sortedness=False,  # polars cannot check it by group, and warns
         )
         .join(seen.group_by("line", "place", "id").agg(last=col("time").max()),
               on=("line", "place", "id"))

@@ -77,6 +77,7 @@ Travel times are means of the last 3 min, and a route is changed for one that is
 _NOT_OF_PROJECTS = (
     "ignore-route-errors", "collision.action", "collision.mingap-factor",
     "collision.check-junctions", "intermodal-collision.action", "pedestrian.striping.jamtime",
+    "lanechange.duration",
 )  # fmt: skip
 """What a SUMO project has as SUMO itself has it, so that it runs as it did before."""
 
@@ -196,7 +197,7 @@ def sumo_config(settings: SumocfgSettings) -> str:
     if settings.options is not None:
         own = sections["processing"]
         for name in _NOT_OF_PROJECTS:
-            own.pop(name)
+            own.pop(name, None)
         own |= {name: value for name, value in settings.options.items() if name not in own}
     if settings.informed:
         given = settings.options or {}

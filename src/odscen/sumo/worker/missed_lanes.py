@@ -38,10 +38,13 @@ class MissedLanes:
     ----------
     net_offset
         What the network's frame is shifted by against OpenDRIVE's.
+    only
+        Who may get another route; ``None``: everyone.
     """
 
-    def __init__(self, net_offset: tuple[float, float]) -> None:
+    def __init__(self, net_offset: tuple[float, float], only: frozenset[str] | None = None) -> None:
         self._offset = net_offset
+        self._only = only
         self._changed: dict[str, float] = {}
 
     def due(self, begin: float, length: float) -> bool:
@@ -68,7 +71,9 @@ class MissedLanes:
         events = []
         for stopped in session.stopped.longer_than(PATIENCE):
             name = stopped.vehicle
-            if name in moved or time - self._changed.get(name, -PATIENCE) < PATIENCE:
+            if name in moved or (self._only is not None and name not in self._only):
+                continue
+            if time - self._changed.get(name, -PATIENCE) < PATIENCE:
                 continue
             view = session.stopped.ahead(name)
             if view is None or view.onwards or view.beside is None:

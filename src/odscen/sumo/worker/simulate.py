@@ -21,7 +21,7 @@ import gc
 import os
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import ExitStack, chdir, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -190,9 +190,12 @@ def simulate(
     """
     start = time.perf_counter()
     sumo = folder / SUMO_FOLDER
-    arguments = ["--configuration-file", str(sumo / CONFIG_FILE), *outputs_to(folder, sumo)]
+    configuration = str((sumo / CONFIG_FILE).absolute())
+    arguments = ["--configuration-file", configuration, *outputs_to(folder, sumo)]
     with _open_stepper(plan, folder, send, watch) as stepper:
-        with open_session(arguments) as session:
+        with ExitStack() as open_things:
+            with chdir(sumo):  # outputs of calibrators are named from where SUMO starts
+                session = open_things.enter_context(open_session(arguments))
             now = stepper.run(session, plan.until)
             lengths = session.lanes.lengths()
         left = None

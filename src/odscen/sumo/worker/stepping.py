@@ -66,7 +66,11 @@ class Stepper:
         self.steps = 0
         self._plan = plan
         self._diversions = Diversions(plan) if plan.measures else None
-        self._missed_lanes = MissedLanes(plan.net_offset)
+        self._missed_lanes = MissedLanes(
+            plan.net_offset,
+            # Vehicles of a SUMO project do as they do in SUMO, until something is closed to them.
+            None if plan.closed else frozenset(a.id for a in plan.actors if not a.from_file),
+        )
         self._detours: Detours | None = None
         self._send = send
         self._watch = watch
