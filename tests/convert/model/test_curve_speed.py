@@ -77,8 +77,8 @@ def test_a_road_is_cut_where_its_curve_is_slower_and_the_limit_stays_elsewhere()
         assert edges[f"1.{n}.f"].get("type") is None
     # Left turn: the lane that runs with s is the outer one, radius 11.75 m; the other 8.25 m.
     outer, inner = (float(lanes[f"1.1.{side}_0"].get("speed")) for side in "fb")
-    assert outer == pytest.approx(math.sqrt(3.2 * 11.75), rel=0.03)
-    assert inner == pytest.approx(math.sqrt(3.2 * 8.25), rel=0.03)
+    assert outer == pytest.approx(math.sqrt(3.1 * 11.75), rel=0.03)
+    assert inner == pytest.approx(math.sqrt(3.1 * 8.25), rel=0.03)
     assert 10.0 * math.pi / 2 < float(lanes["1.1.f_0"].get("length")) < 30.0
     # What trucks and buses drive there is a restriction of the edge's type.
     kind = next(k for k in made.xml.iter("type") if k.get("id") == edges["1.1.f"].get("type"))

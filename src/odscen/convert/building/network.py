@@ -33,7 +33,13 @@ from odscen.convert.model.access import speed as lane_speed
 from odscen.convert.model.access import vehicle_classes
 from odscen.convert.model.connections import LostConnection, find_connections
 from odscen.convert.model.conversion_report import ConversionReport, parser_entries
-from odscen.convert.model.curve_speed import BINDING, HEAVY, comfortable_speed, sharpest_bend
+from odscen.convert.model.curve_speed import (
+    BINDING,
+    HEAVY,
+    TURNING,
+    comfortable_speed,
+    sharpest_bend,
+)
 from odscen.convert.model.edge_plan import merge_gaps, plan_edges, side_gaps
 from odscen.convert.model.lane_alignment import divided, evaluate
 from odscen.convert.model.net import LEAST_LENGTH, NORMAL, Net, NetEdge, NetJunction, NetLane
@@ -522,7 +528,9 @@ class _NetworkBuilder:
         ]
         speed = min(own) if own else around
         bend = sharpest_bend(line.shape)
-        curve, heavy = (float(comfortable_speed(bend, share=share)) for share in (1.0, HEAVY))
+        curve, heavy = (
+            float(comfortable_speed(bend, share=TURNING * share)) for share in (1.0, HEAVY)
+        )
         if heavy >= BINDING * speed:
             return round(speed, 2), math.inf
         return round(min(speed, curve) if curve < BINDING * speed else speed, 2), round(heavy, 2)

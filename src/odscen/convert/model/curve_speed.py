@@ -2,11 +2,11 @@
 
 The limit of a lane stays the legal one; what is driven in a curve is what feels comfortable to the
 side, and less than that is driven by nobody's order. Lateral accelerations that drivers choose fall
-with speed: about 3 m/s2 in turns at 20 to 30 km/h, 2 m/s2 at 100 km/h (Bosetti, Da Lio and Saroldi,
-"On the human control of vehicles: an experimental study of acceleration", European Transport
-Research Review 6, 2014; Reymond et al., "Role of lateral acceleration in curve driving", Human
-Factors 43, 2001; side friction demands of AASHTO, "A Policy on Geometric Design of Highways and
-Streets", 2018, table 3-7, lie below). Each driver's speed factor spreads them.
+with speed: 2.5 to 3 m/s2 in turns at 20 to 30 km/h, 2 m/s2 at 100 km/h (Bosetti, Da Lio and
+Saroldi, "On the human control of vehicles: an experimental study of acceleration", European
+Transport Research Review 6, 2014; Reymond et al., "Role of lateral acceleration in curve driving",
+Human Factors 43, 2001; side friction demands of AASHTO, "A Policy on Geometric Design of Highways
+and Streets", 2018, table 3-7, lie below). Each driver's speed factor spreads them.
 """
 
 from __future__ import annotations
@@ -23,11 +23,14 @@ if TYPE_CHECKING:
     from odscen.opendrive.lanes import RoadTable
 
 _SPEEDS = np.array([0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 130.0]) / 3.6
-_LATERAL = np.array([3.2, 3.2, 2.8, 2.5, 2.2, 2.0, 1.8])
+_LATERAL = np.array([3.1, 3.1, 2.7, 2.4, 2.2, 2.0, 1.8])
 """m/s2 that the median driver chooses at these speeds, m/s."""
 
 HEAVY = 0.65
 """Share of it that drivers of trucks and buses choose: loads shift and roll over, people stand."""
+
+TURNING = 0.93
+"""Share of it in junctions, where drivers look for others: 2 to 3 m/s2 in turns."""
 
 HEAVY_CLASSES = ("truck", "trailer", "bus", "coach")
 """SUMO's vehicle classes that this is of."""
