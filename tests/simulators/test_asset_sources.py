@@ -117,6 +117,14 @@ def test_a_row_of_another_kind_is_refused_with_its_field_or_value(
         FetchedModels(file).models()
 
 
+@pytest.mark.parametrize("rows", [["mini"], [None], [7], "mini", {"id": "mini"}, [["id", "mini"]]])
+def test_rows_that_are_none_are_refused(tmp_path: Path, rows: object) -> None:
+    file = tmp_path / "blueprints.json"
+    file.write_text(json.dumps({"blueprints": rows}))
+    with pytest.raises(WorkspaceError, match="not a catalogue of models"):
+        FetchedModels(file).models()
+
+
 def test_the_example_of_the_seam_runs() -> None:
     (example,) = doctest.DocTestFinder(recurse=False).find(
         AssetSource, "AssetSource", globs={**vars(assets), "Body": Body}

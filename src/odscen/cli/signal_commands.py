@@ -113,6 +113,20 @@ def _draw_sheets(
     return [write_text(out / name, text) for name, text in sheets.items()]
 
 
+def _write_with_notes(
+    document: Scenario, notes: Sequence[str], path: Path, *, as_json: bool
+) -> None:
+    from odscen.app.scenarios import write_scenario
+
+    written = write_scenario(document, path)
+    for note in notes:
+        log(note)
+    if as_json:
+        print_json({"scenario": str(written), "notes": list(notes)})
+    else:
+        log(f"wrote {written}")
+
+
 @app.command("import")
 def import_(
     scenario: ScenarioArgument,
@@ -134,20 +148,13 @@ def import_(
     A program that conflicts, whose intergreens are too short, or that stages cannot say runs as it
     is: its phases stay SUMO's own, and what was found in it is printed.
     """
-    from odscen.app import scenarios
     from odscen.app.signals.signal_plans import import_signals
     from odscen.maps.store import Workspace
 
     document, notes = import_signals(
         Workspace.open(workspace), scenario, file, junctions=junction or (), strict=strict
     )
-    path = scenarios.write_scenario(document, out or scenario)
-    for note in notes:
-        log(note)
-    if as_json:
-        print_json({"scenario": str(path), "notes": list(notes)})
-    else:
-        log(f"wrote {path}")
+    _write_with_notes(document, notes, out or scenario, as_json=as_json)
 
 
 @app.command()
@@ -183,7 +190,6 @@ def play_log(
     as_json: JsonOption = False,
 ) -> None:
     """Let a light show what the log of its controller says, second by second."""
-    from odscen.app import scenarios
     from odscen.app.signals.controller_logs import play_controller_log
     from odscen.maps.store import Workspace
 
@@ -202,13 +208,7 @@ def play_log(
         device=device,
         begin=begin,
     )
-    path = scenarios.write_scenario(document, out or scenario)
-    for note in notes:
-        log(note)
-    if as_json:
-        print_json({"scenario": str(path), "notes": list(notes)})
-    else:
-        log(f"wrote {path}")
+    _write_with_notes(document, notes, out or scenario, as_json=as_json)
 
 
 @app.command()

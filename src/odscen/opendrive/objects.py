@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from odscen.opendrive.sign_catalogue import sign_meaning
+from odscen.opendrive.sign_catalogue import OWN_NUMBERS, country_of, sign_meaning
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -302,7 +302,7 @@ def signal_kind(signal: Signal) -> SignalKind:
     if code.startswith("1.000."):  # as the tables of 1.4 print them
         code = code.replace(".", "")
     kind = _ANYWHERE.get(code) or _ANYWHERE.get(f"{code}{signal.subtype.lower()}")
-    if kind is not None:
+    if kind is not None and country_of(signal) not in OWN_NUMBERS:
         return kind
     if signal.dynamic and code.startswith("10000"):
         return "traffic_light"

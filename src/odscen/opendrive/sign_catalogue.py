@@ -147,6 +147,121 @@ _CN: Final[dict[str, SignMeaning]] = {
     "101-39": "end_of_speed_limit",
 }
 
+# Reglement verkeersregels en verkeerstekens 1990, annex 1.
+_NL: Final[dict[str, SignMeaning]] = {
+    "b6": "yield",
+    "b7": "stop",
+    "b1": "priority",
+    "b2": "end_of_priority",
+    "c2": "no_entry",
+    "a1": "speed_limit",
+    "a2": "end_of_speed_limit",
+    "f13": "bus_lane",
+    "l2": "crosswalk",
+}
+
+# Royal decree of 1 December 1975, articles 67 to 71.
+_BE: Final[dict[str, SignMeaning]] = {
+    "b1": "yield",
+    "b5": "stop",
+    "b9": "priority",
+    "b11": "end_of_priority",
+    "c1": "no_entry",
+    "c43": "speed_limit",
+    "c45": "end_of_speed_limit",
+    "f17": "bus_lane",
+    "f49": "crosswalk",
+}
+
+# Regulation on road signs and signals of 31 July 2002; codes without their hyphens.
+_PL: Final[dict[str, SignMeaning]] = {
+    "a7": "yield",
+    "b20": "stop",
+    "d1": "priority",
+    "d2": "end_of_priority",
+    "b2": "no_entry",
+    "b33": "speed_limit",
+    "b34": "end_of_speed_limit",
+    "d11": "bus_lane",
+    "d6": "crosswalk",
+}
+
+# Decree 294/2015, annexes.
+_CZ: Final[dict[str, SignMeaning]] = {
+    "p4": "yield",
+    "p6": "stop",
+    "p2": "priority",
+    "p3": "end_of_priority",
+    "b2": "no_entry",
+    "b20a": "speed_limit",
+    "b20b": "end_of_speed_limit",
+    "ip6": "crosswalk",
+}
+
+# Signalisationsverordnung (SSV), annex 2.
+_CH: Final[dict[str, SignMeaning]] = {
+    "3.02": "yield",
+    "3.01": "stop",
+    "3.03": "priority",
+    "3.04": "end_of_priority",
+    "2.02": "no_entry",
+    "2.30": "speed_limit",
+    "2.53": "end_of_speed_limit",
+    "2.64": "bus_lane",
+    "4.11": "crosswalk",
+}
+
+# Reglamento General de Circulación, annex I; codes without their hyphens.
+_ES: Final[dict[str, SignMeaning]] = {
+    "r1": "yield",
+    "r2": "stop",
+    "r3": "priority",
+    "r4": "end_of_priority",
+    "r101": "no_entry",
+    "r301": "speed_limit",
+    "r501": "end_of_speed_limit",
+    "s13": "crosswalk",
+}
+
+# Skiltforskriften (2005).
+_NO: Final[dict[str, SignMeaning]] = {
+    "202": "yield",
+    "204": "stop",
+    "206": "priority",
+    "208": "end_of_priority",
+    "302": "no_entry",
+    "362": "speed_limit",
+    "364": "end_of_speed_limit",
+    "508.1": "bus_lane",
+    "516": "crosswalk",
+}
+
+# Enforcement rule of the Road Traffic Act, annex 6.
+_KR: Final[dict[str, SignMeaning]] = {
+    "228": "yield",
+    "227": "stop",
+    "211": "no_entry",
+    "224": "speed_limit",
+    "330": "bus_lane",
+    "322": "crosswalk",
+}
+
+# AS 1742, regulatory signs; codes without their hyphens.
+_AU: Final[dict[str, SignMeaning]] = {
+    "r12": "yield",
+    "r11": "stop",
+    "r24": "no_entry",
+    "r41": "speed_limit",
+}
+
+# Manual of Uniform Traffic Control Devices for Canada; codes without their hyphens.
+_CA: Final[dict[str, SignMeaning]] = {
+    "ra2": "yield",
+    "ra1": "stop",
+    "rb23": "no_entry",
+    "rb1": "speed_limit",
+}
+
 _CATALOGUES: Final[dict[str, dict[str, SignMeaning]]] = {
     "DE": _DE,
     "US": _US,
@@ -156,6 +271,16 @@ _CATALOGUES: Final[dict[str, dict[str, SignMeaning]]] = {
     "JP": _JP,
     "RU": _RU,
     "CN": _CN,
+    "NL": _NL,
+    "BE": _BE,
+    "PL": _PL,
+    "CZ": _CZ,
+    "CH": _CH,
+    "ES": _ES,
+    "NO": _NO,
+    "KR": _KR,
+    "AU": _AU,
+    "CA": _CA,
 }
 
 # Names of 1.4 and codes of ISO 3166-1 alpha-3, which older versions write.
@@ -175,7 +300,23 @@ _COUNTRIES: Final[dict[str, str]] = {
     "RUSSIA": "RU",
     "CHN": "CN",
     "CHINA": "CN",
+    "NLD": "NL",
+    "BEL": "BE",
+    "POL": "PL",
+    "CZE": "CZ",
+    "CHE": "CH",
+    "ESP": "ES",
+    "NOR": "NO",
+    "KOR": "KR",
+    "AUS": "AU",
+    "CAN": "CA",
 }
+
+_WITHOUT_HYPHENS: Final = frozenset({"PL", "ES", "AU", "CA"})
+"""Countries whose codes stand above without the hyphens that files have or leave out."""
+
+OWN_NUMBERS: Final = frozenset({"JP", "KR", "NO"})
+"""Countries in which the German numbers, which many writers use everywhere, are other signs."""
 
 _NO_SUBTYPE: Final = frozenset({"", "-1", "none"})
 
@@ -207,5 +348,7 @@ def sign_meaning(signal: Signal) -> SignMeaning | None:
     if subtype not in _NO_SUBTYPE:
         codes = [f"{code}{mark}{subtype}" for mark in ("-", ".", "")] + codes
     # German numbers carry the value behind a stroke, as 274-50 does.
+    if country in _WITHOUT_HYPHENS:
+        codes += [name.replace("-", "") for name in codes]
     codes.append(code.partition("-")[0])
     return next((catalogue[name] for name in codes if name in catalogue), None)

@@ -202,7 +202,7 @@ class FetchedModels(AssetSource):
         """
         try:
             rows = json.loads(self.file.read_text(encoding="utf-8"))["blueprints"]
-            return [_read_blueprint(row) for row in rows]
+            return [_read_blueprint(dict(row)) for row in rows]
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise WorkspaceError(
                 f"{self.file}: not a catalogue of models ({error}); remove it or fetch it again"
