@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import math
 import os
 import shutil
@@ -24,7 +25,7 @@ from odscen.base.errors import InputError, OdscenError
 from odscen.base.xml_reading import read_xml
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
-from odscen.runs.recorded import read_lanes, read_light_states
+from odscen.runs.recorded import read_lanes, read_light_states, read_visits
 from odscen.scenario import edits
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.measures_document import RoadClosure
@@ -186,7 +187,7 @@ def run_of_sumo(folder: Path, config: str, *additional: str, net: str) -> Origin
     subprocess.run(
         [
             BIN / "sumo", "-c", config, "-a", ",".join((*additional, "measured.add.xml")),
-            "--tripinfo-output", "trips.xml", "--precision", "4",
+            "--tripinfo-output", "trips.xml", "--precision", "4", "--stop-output", "stops.xml",
         ],
         cwd=folder, check=True, capture_output=True,
     )  # fmt: skip
@@ -417,3 +418,113 @@ def test_a_document_cannot_make_sumo_write_elsewhere() -> None:
     }
     with pytest.raises(InputError, match="cannot be unpacked"):
         _ = SumoFile(name="a.xml", kind="routes", packed="aGVsbG8=").text
+
+
+TYPES = """<additional><vType id="car"/><vType id="van" vClass="delivery" length="6"/>
+<vTypeDistribution id="mix"><vType id="x" maxSpeed="12" probability="0.3"/>
+<vType id="y" lcStrategic="2" probability="0.7"/></vTypeDistribution></additional>"""
+PLACES = """<additional><include href="inc/types.xml"/><route id="r1" edges="A0B0 B0C0"/>
+<route id="r2" edges="A0B0 B0B1"/><routeDistribution id="rd" routes="r1 r2" probabilities="4 6"/>
+<taz id="w" edges="A0A1 A1A2"/><taz id="e"><tazSource id="B2C2" weight="1"/>
+<tazSink id="B2C2" weight="1"/></taz><busStop id="s1" lane="A1B1_1" startPos="40" endPos="60"/>
+<busStop id="s2" lane="B1C1_1" startPos="40" endPos="60"/>
+<parkingArea id="pa" lane="A2B2_1" startPos="20" endPos="80" roadsideCapacity="4"/></additional>"""
+ACTS = """<additional><rerouter id="rr" edges="A0B0"><interval begin="200" end="500">
+<destProbReroute id="C0C1" probability="1"/></interval></rerouter>
+<calibrator id="c" edge="C2C1" pos="0"><route id="cr" edges="C2C1 C1C0"/>
+<flow begin="0" end="600" route="cr" vehsPerHour="300" speed="10" type="car"/></calibrator>
+<variableSpeedSign id="v" lanes="B1C1_1"><step time="100" speed="7"/></variableSpeedSign>
+<entryExitDetector id="e3" period="100" file="e3.xml"><detEntry lane="A1B1_1" pos="10"/>
+<detExit lane="B1C1_1" pos="20"/></entryExitDetector><routeProbe id="p" edge="A0B0" period="100"
+ file="probe.xml"/><poi id="p" x="0" y="0"/></additional>"""
+DRAWN = """<routes><trip id="t0" type="mix" depart="0" fromTaz="w" toTaz="e"/>
+<flow id="ft" type="mix" begin="0" end="600" number="60" fromTaz="w" toTaz="e"/>
+<flow id="fd" type="car" begin="0" end="600" period="exp(0.1)" from="A2B2" to="C2C1"/>
+<vehicle id="vd" type="van" route="rd" depart="20"/>
+<flow id="fr" route="rd" begin="30" end="500" vehsPerHour="200" type="car" departLane="best"/>
+<trip id="pk" type="car" depart="30" from="A2B2" to="C2C1">
+<stop parkingArea="pa" duration="60"/></trip></routes>"""
+RIDERS = """<routes><vType id="bus" vClass="bus"/>
+<personFlow id="pf" begin="0" end="300" period="10">
+<walk from="A0A1" busStop="s1"/><ride busStop="s2" lines="L1"/><walk to="C1C2"/></personFlow>
+<person id="pt" depart="5"><personTrip from="A0A1" to="C1C2" modes="public"/></person>
+<person id="drv" depart="10"><walk edges="B0B1" arrivalPos="40"/><ride from="B0B1" to="B1B2"
+ lines="own"/></person><vehicle id="own" type="car" depart="triggered"><route edges="B0B1 B1B2"/>
+</vehicle><flow id="bus" line="L1" type="bus" begin="40" end="700" period="120">
+<route edges="A1B1 B1C1 C1C2"/><stop busStop="s1" duration="15" until="100"/>
+<stop busStop="s2" duration="15" until="160"/></flow></routes>"""
+ODD = """<sumoConfiguration><input><net-file value="../grid.net.xml.gz"/>
+<route-files value="drawn.rou.xml.gz, riders.rou.xml"/>
+<additional-files value="places.add.xml, acts.add.xml"/></input>
+<time><end value="0:15:00"/><step-length value="0.5"/></time><processing>
+<lateral-resolution value="0.8"/><scale value="1.3"/><ignore-route-errors value="true"/>
+</processing><random_number><seed value="7"/></random_number></sumoConfiguration>"""
+
+
+@pytest.fixture(scope="module")
+def odd_project(project: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Packed files, an included one, a network above, and what is drawn or rides."""
+    above = tmp_path_factory.mktemp("above")
+    folder = above / "odd"
+    (folder / "inc").mkdir(parents=True)
+    shutil.copy(project / "grid.net.xml", above)
+    (above / "grid.net.xml.gz").write_bytes(gzip.compress((above / "grid.net.xml").read_bytes()))
+    (folder / "drawn.rou.xml.gz").write_bytes(gzip.compress(DRAWN.encode()))
+    for name, text in {
+        "inc/types.xml": TYPES, "places.add.xml": PLACES, "acts.add.xml": ACTS,
+        "riders.rou.xml": RIDERS, "odd.sumocfg": ODD,
+    }.items():  # fmt: skip
+        (folder / name).write_text(text)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def odd_run(store: Workspace, odd_project: Path) -> Run:
+    made = import_file(store, odd_project / "odd.sumocfg")
+    assert made.scenario is not None
+    assert made.problems == ()
+    return run(store, made.scenario)
+
+
+@pytest.fixture(scope="module")
+def odd_alone(odd_project: Path) -> Original:
+    command = ["places.add.xml", "acts.add.xml"]
+    return run_of_sumo(odd_project, "odd.sumocfg", *command, net="../grid.net.xml")
+
+
+def test_packed_included_and_drawn_traffic_runs_as_in_sumo(
+    odd_run: Run, odd_alone: Original
+) -> None:
+    assert_agrees(odd_run, odd_alone)
+    assert len(odd_alone.trips) > 150
+
+
+def test_no_passenger_is_lost_and_stops_loads_and_delays_are_those_of_sumo(
+    odd_run: Run, odd_alone: Original, odd_project: Path
+) -> None:
+    assert odd_alone.trips
+    persons = {
+        str(e.get("id")): float(e.get("duration", ""))
+        for e in etree.parse(odd_project / "trips.xml").iter("personinfo")
+    }
+    arrived = odd_run.events().filter(pl.col("kind") == "arrived")
+    mine = dict(arrived.select("actor", "travel_time").rows())
+    assert len(persons) > 40
+    assert {name: mine.get(name) for name in persons} == persons
+    own = {row["id"]: row["status"] for row in odd_run.actors().to_dicts()}
+    assert all(own[f"pf.{k}"] == "arrived" for k in range(30))
+    visits = read_visits(odd_run.folder)
+    assert visits is not None
+    theirs = [
+        (
+            e.get("id"), e.get("busStop"), float(e.get("started", "")), float(e.get("ended", "")),
+            float(e.get("ended", "")) - float(e.get("delay", "")),
+            *(int(e.get(f"{kind}Persons", "")) for kind in ("initial", "loaded", "unloaded")),
+        )
+        for e in etree.parse(odd_project / "stops.xml").iter("stopinfo")
+        if e.get("busStop")
+    ]  # fmt: skip
+    assert sorted(visits.rows()) == sorted(theirs)
+    assert visits["boarded"].sum() == visits["alighted"].sum() == 39
+    report = (odd_run.folder / "report.html").read_text()
+    assert "On board on arrival" in report

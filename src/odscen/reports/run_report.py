@@ -431,9 +431,11 @@ def _transit_values(visits: pl.DataFrame, values: Mapping[str, Any]) -> dict[str
     """Cards over all lines, and a row for each stop of each line."""
     if visits.is_empty():
         return None
+    rows = stops_served(visits).to_dicts()
     return {
         "cards": figure_cards(ReportSection.TRANSIT, values),
-        "rows": stops_served(visits).to_dicts(),
+        "rows": rows,
+        "passengers": any(row.get("boarded") for row in rows),
         "late_minutes": LATE / 60.0,
     }
 

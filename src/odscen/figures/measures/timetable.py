@@ -30,7 +30,8 @@ def stops_served(visits: pl.DataFrame) -> pl.DataFrame:
     """A row for each line and stop in the order in which trips serve them.
 
     Columns ``line``, ``stop``, ``visits``, ``dwell`` (mean, s), ``late`` (mean, s) and ``on_time``
-    (share of scheduled departures); the last two are null without a timetable.
+    (share of scheduled departures), null without a timetable; ``boarded``, ``alighted`` (persons)
+    and ``on_board`` (mean of persons on arrival).
     """
     import polars as pl
 
@@ -46,6 +47,11 @@ def stops_served(visits: pl.DataFrame) -> pl.DataFrame:
             pl.col("dwell").mean(),
             pl.col("late").mean(),
             (pl.col("late") <= LATE).mean().alias("on_time"),
+            *(
+                (pl.col("boarded").sum(), pl.col("alighted").sum(), pl.col("on_board").mean())
+                if "boarded" in visits.columns  # runs of before have no passengers
+                else ()
+            ),
         )
         .sort("line", maintain_order=True)
     )

@@ -431,15 +431,21 @@ def stop_table(stopinfo: Path) -> pl.DataFrame:
         left, delay = float(row.get("ended", "-1")), row.get("delay")
         if row.get("busStop") and left >= 0.0:
             scheduled = None if delay is None else round(left - float(delay), 4)
-            rows.append(
-                (row.get("id"), row.get("busStop"), float(row.get("started", "")), left, scheduled)
-            )
+            persons = [
+                int(row.get(name, "0"))
+                for name in ("initialPersons", "loadedPersons", "unloadedPersons")
+            ]
+            came = float(row.get("started", ""))
+            rows.append((row.get("id"), row.get("busStop"), came, left, scheduled, *persons))
     schema = {
         "actor": pl.String,
         "stop": pl.String,
         "arrival": pl.Float64,
         "departure": pl.Float64,
         "scheduled": pl.Float64,
+        "on_board": pl.Int64,
+        "boarded": pl.Int64,
+        "alighted": pl.Int64,
     }
     table = pl.DataFrame(rows, schema=schema, orient="row")
     return table.sort("departure", "actor", "stop")

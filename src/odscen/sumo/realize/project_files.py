@@ -94,6 +94,8 @@ class ProjectFiles:
         Road users that are known before the run, in order of departure.
     notes
         What the plan does not know of.
+    stops
+        Whether lines have stops.
     """
 
     routes: tuple[str, ...]
@@ -101,6 +103,7 @@ class ProjectFiles:
     texts: dict[str, str]
     actors: tuple[PlannedActor, ...]
     notes: tuple[str, ...]
+    stops: bool
 
 
 def project_files(
@@ -142,6 +145,7 @@ def project_files(
         texts,
         reader.actors(),
         tuple(reader.notes),
+        any(root.find("busStop") is not None for _, root in roots),
     )
 
 

@@ -283,6 +283,7 @@ def _run_files(
         elevation=plan.elevation,
         signals=signals is not None,
         stops=stops,
+        project_stops=project is not None and project.stops,
         parking=bool(plan.parking),
         closures=closures is not None,
         informed=any(actor.informed for actor in plan.actors),

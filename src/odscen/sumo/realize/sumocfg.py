@@ -104,6 +104,8 @@ class SumocfgSettings:
         Whether there are programs of traffic lights beside the network's own.
     stops
         Whether there are stops of lines, and what vehicles do there is recorded.
+    project_stops
+        Whether files of a SUMO project have stops, and what vehicles do there is recorded.
     parking
         Whether trips park, and when they take and leave their places is recorded.
     closures
@@ -135,6 +137,7 @@ class SumocfgSettings:
     elevation: bool = False
     signals: bool = False
     stops: bool = False
+    project_stops: bool = False
     parking: bool = False
     closures: bool = False
     recording: Recording = field(default_factory=Recording)
@@ -235,7 +238,7 @@ def _output_options(settings: SumocfgSettings) -> dict[str, str]:
         "tripinfo-output.write-unfinished": "true",
         "precision": "4",
     }
-    if settings.stops or settings.parking:
+    if settings.stops or settings.project_stops or settings.parking:
         unended = {"stop-output.write-unfinished": "true"} if settings.parking else {}
         trips = {"stop-output": STOPINFO_FILE, **unended, **trips}
     if not recording.trajectories:
