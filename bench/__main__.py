@@ -20,6 +20,7 @@ ALL = (
     "capacity",
     "saturation",
     "motion",
+    "published",
     "intervals",
     "weather",
     "signal_timing",

@@ -90,12 +90,12 @@ def test_chains_that_meet_at_a_direct_junction_are_neighbours() -> None:
     assert segments.adjacency.tolist() == [[0, 1]]
 
 
-def test_roads_that_only_one_side_links_are_neighbours_but_not_joined() -> None:
+def test_roads_that_only_one_side_links_are_one_chain() -> None:
     odr = network(
         road("1", ONE, length=100.0, after="road 2 start"), road("2", ONE, x=100.0, length=100.0)
     )
     segments = build_segments(odr).segments
-    assert segments.ids == ("r1", "r2")
+    assert segments.ids == ("r1-0", "r1-1")
     assert segments.adjacency.tolist() == [[0, 1]]
 
 

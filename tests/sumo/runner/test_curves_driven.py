@@ -86,7 +86,7 @@ def driven(
     file.write_text(text)
     store = Workspace.open(folder / "workspace")
     entry = store.add_map(file)
-    settings = GenerationSettings(map_name="course", fill=0.0)
+    settings = GenerationSettings(map_name="course", fill=0.0, roi_segments=100)
     scenario = read_scenario(generate(store, settings=settings)[0])
     right = hdg - math.pi / 2.0
     goal = entry.nearest(
