@@ -88,6 +88,7 @@ def main() -> None:
                         state = client.edit(state["version"], answered + 1)
                         answered = state["document"]["seed"]
                 killer.join()
+        time.sleep(2.5)  # files that are younger may be another machine's and are left alone
         with page.served(workspace.root) as server:
             client = Client(server, scenario)
             state = client.ask("GET")

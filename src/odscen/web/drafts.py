@@ -19,7 +19,7 @@ from odscen.app.scenarios import SUFFIX
 from odscen.base.errors import ConflictError, NotFoundError, ScenarioError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
-from odscen.base.text_files import write_text
+from odscen.base.text_files import clear_parts, write_text
 from odscen.maps.folder_names import check_name, is_name
 from odscen.maps.wastebasket import HISTORY, Wastebasket
 from odscen.scenario.document.json_form import dumps, loads
@@ -68,6 +68,7 @@ class Drafts:
         self._folder = workspace.scenarios
         self._lock = threading.RLock()
         self._open: dict[str, Draft] = {}
+        clear_parts(self._folder)
 
     def rows(self) -> list[ScenarioRow]:
         """All scenarios, those changed last first."""
