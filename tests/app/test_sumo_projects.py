@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import math
 import os
+import re
 import shutil
 import subprocess
 from collections import Counter
@@ -407,6 +408,51 @@ def test_wrong_projects_are_refused_with_file_and_reason(
         (tmp_path / name).write_text(text)
     with pytest.raises(OdscenError, match=words):
         import_file(store, tmp_path / "x.sumocfg")
+
+
+NETWORK_FAULTS: dict[str, tuple[str, str, str]] = {
+    "no place": (r"<location[^>]*/>", "", "<location> is missing"),
+    "shape of words": (r' shape="[^"]*"', ' shape="a,b c,d"', "'shape' .* Invalid Number Format"),
+    "shape that is no number": (r' shape="[^"]*"', ' shape="nan,nan 1,1"', "no usable shape"),
+    "no shape": (r'(<lane [^>]*) shape="[^"]*"', r"\1", "'shape' is missing"),
+    "length of words": (r'length="[^"]*"', 'length="long"', "'long'"),
+    "speed of words": (r'speed="[^"]*"', 'speed="fast"', "'speed' .* fast"),
+    "speed below 0": (
+        r'speed="[^"]*"',
+        'speed="-3"',
+        "no usable length, speed or width|netconvert crashed",
+    ),
+    "no lanes": (r"<lane [^>]*/>", "", "Invalid lane index"),
+    "lane number of words": (r'index="0"', 'index="x"', "'x'"),
+    "no junctions": (r"(?s)<junction .*?</junction>", "", "from-node .* is not known"),
+    "offset of words": (
+        r'netOffset="[^"]*"',
+        'netOffset="a"',
+        "'netOffset' .* not a valid position",
+    ),
+    "edge that is not there": (
+        "</net>",
+        '<connection from="A0B0" to="nope" fromLane="0" toLane="0" dir="s" state="M"/></net>',
+        "Unknown edge 'nope'",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", NETWORK_FAULTS)
+def test_twelve_wrong_networks_are_refused_with_file_and_reason(
+    project: Path, tmp_path: Path, fault: str
+) -> None:
+    pattern, instead, words = NETWORK_FAULTS[fault]
+    text, count = re.subn(pattern, instead, (project / "grid.net.xml").read_text())
+    assert count
+    (tmp_path / "wrong.net.xml").write_text(text)
+    (tmp_path / "x.sumocfg").write_text(
+        "<configuration><net-file value='wrong.net.xml'/></configuration>"
+    )
+    store = Workspace.open(tmp_path / "store")
+    with pytest.raises(OdscenError, match=f"wrong.net.xml.*({words})"):
+        import_file(store, tmp_path / "x.sumocfg")
+    assert store.map_names() == []
 
 
 def test_a_document_cannot_make_sumo_write_elsewhere() -> None:

@@ -145,6 +145,8 @@ def _read_phase(element: etree._Element, place: str, *, actuated: bool) -> FileP
             f"{place}: letter {wrong[0]!r} of state {state!r} is not one of G, g, y, r, u"
         )
     seconds = _read_number(element, "duration", None, place)
+    if seconds <= 0.0:
+        raise InputError(f"{place}: duration is {element.get('duration')!r}, not above 0")
     least = _read_number(element, "minDur", seconds, place) if actuated else seconds
     most = _read_number(element, "maxDur", max(seconds, least), place) if actuated else seconds
     state = state.replace("Y", "y").replace("R", "r").replace("u", "r")

@@ -200,6 +200,39 @@ def test_what_is_no_program_of_this_light_is_refused_with_its_place(
     assert "own.tll.xml" in str(raised.value)
 
 
+WRONG_PROGRAMS: dict[str, tuple[str, str, str]] = {
+    "no XML": (r"(?s).*", "junction;group;begin", "not well-formed"),
+    "cut off": (r"(?s)</tlLogic>.*", "", "not well-formed"),
+    "no program": ("tlLogic", "busStop", "there is no <tlLogic>"),
+    "of another light": (r' id="[^"]*"', ' id="nowhere"', "no program for 'J10001'"),
+    "of no light": (r' id="[^"]*"', "", "no program for 'J10001'"),
+    "no phases": (r"<phase [^>]*/>", "", "there are no phases"),
+    "no states": (r'state="[^"]*"', "", "0 letters, but the light of this map has 24 links"),
+    "no durations": (r'duration="[^"]*"', "", "phase 0: duration is None, not a number"),
+    "duration of words": (r'duration="[^"]*"', 'duration="ten"', "'ten', not a number"),
+    "duration that is no number": (r'duration="[^"]*"', 'duration="nan"', "'nan', not a number"),
+    "duration of 0": (r'duration="[^"]*"', 'duration="0"', "phase 0: duration is '0', not above 0"),
+    "duration below 0": (r'duration="[^"]*"', 'duration="-3"', "'-3', not above 0"),
+    "another type": (r'type="[^"]*"', 'type="magic"', "type 'magic' is not static or actuated"),
+    "offset of words": (r'offset="[^"]*"', 'offset="abc"', "offset is 'abc', not a number"),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG_PROGRAMS)
+def test_fourteen_wrong_programs_are_refused_with_their_place(
+    workspace: Workspace, tmp_path: Path, fault: str
+) -> None:
+    pattern, instead, words = WRONG_PROGRAMS[fault]
+    walks = [(30.0, "G" * 10 + "r" * 14), (3.0, "y" * 10 + "r" * 14), (8.0, "r" * 24)]
+    file = written(tmp_path, walks)
+    text, count = re.subn(pattern, instead, file.read_text())
+    assert count
+    file.write_text(text)
+    with pytest.raises(InputError, match=words) as refused:
+        import_signals(workspace, placed(workspace, scenario(None)), file)
+    assert "own.tll.xml" in str(refused.value)
+
+
 def test_a_tllogic_that_shows_a_stage_twice_in_a_cycle_is_refused(
     workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -15,7 +15,7 @@ from odscen.app.maps import load_map
 from odscen.app.scenarios import check_scenario, write_scenario
 from odscen.base.atomic_folders import discard, scratch_folder
 from odscen.base.checksums import digest
-from odscen.base.errors import InputError, NotFoundError
+from odscen.base.errors import InputError, NotFoundError, ToolError
 from odscen.base.given_files import MOST, as_path, read_given
 from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
@@ -292,8 +292,8 @@ def map_of_network(
     ------
     InputError
         If it is no network, or none of that map.
-    ToolError
-        If netconvert refuses it.
+    InputError
+        If netconvert refuses it, with the first error that it names, crashes or passes a limit.
     """
     sha256 = digest(content)
 
@@ -313,7 +313,14 @@ def map_of_network(
     bare = re.sub(r"(\.net)?(\.xml)?(\.gz)?$", "", named.rpartition("/")[2], flags=re.IGNORECASE)
     bare = re.sub(r"[^A-Za-z0-9_.-]+", "-", bare).strip("-._")[:60] or "network"
     name = _free_map_name(workspace, bare)
-    xodr, _ = opendrive_of_network(content)
+    try:
+        xodr, _ = opendrive_of_network(content)
+    except ToolError as error:
+        said = [line for line in error.output.splitlines() if line.startswith("Error: ")]
+        words = (said or str(error).splitlines())[0].removeprefix("Error: ")
+        raise InputError(
+            f"the SUMO network cannot be read: {words}", file=printable(named)
+        ) from error
     entry = workspace.add_map_content(
         xodr, file=f"{name}.xodr", name=name, network=GivenNetwork(content, printable(named))
     )

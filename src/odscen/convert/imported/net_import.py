@@ -191,9 +191,8 @@ def read_network(content: bytes, *, offset: tuple[float, float] | None = None) -
             _with_sumolib(root), lefthand=root.get("lefthand") == "true", given=offset
         )
     except (LookupError, ValueError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"the SUMO network cannot be read: {type(error).__name__}: {error}"
-        ) from error
+        words = f"there is no {error}" if isinstance(error, KeyError) else str(error)
+        raise InputError(f"the SUMO network cannot be read: {words}") from error
 
 
 def _with_sumolib(root: etree._Element) -> Any:
