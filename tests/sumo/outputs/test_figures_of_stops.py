@@ -64,7 +64,7 @@ def test_figures_of_lines_are_those_of_the_stop_output(tmp_path: Path) -> None:
     assert values["departure_lateness"] == pytest.approx(late.mean(), rel=CLOSE)
     assert values["on_time_departures"] == pytest.approx((late <= 300.0).mean(), rel=CLOSE)
     assert data.visits is not None
-    for _, stop, visits, dwell, delay, _ in stops_served(data.visits).iter_rows():
+    for _, stop, visits, dwell, delay, *_ in stops_served(data.visits).iter_rows():
         own = [one for one in ended if one["busStop"] == stop]
         stood = [float(one["ended"]) - float(one["started"]) for one in own]
         assert visits == len(own)

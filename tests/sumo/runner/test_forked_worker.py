@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -114,14 +115,11 @@ def test_a_worker_that_hangs_when_its_run_is_called_off_is_killed(
     stopped: list[psutil.Process] = []
 
     def stop_worker() -> bool:
-        if not stopped:
-            stopped.extend(
-                child
-                for child in psutil.Process().children()
-                if worker_process.WORKER in child.cmdline()
-            )
-            for child in stopped:
-                child.suspend()
+        for child in psutil.Process().children() if not stopped else ():
+            with suppress(psutil.Error):  # others have ended
+                if worker_process.WORKER in child.cmdline():
+                    child.suspend()
+                    stopped.append(child)
         return bool(stopped)
 
     class CalledOffError(Exception):
