@@ -291,9 +291,8 @@ def map_of_network(
     Raises
     ------
     InputError
-        If it is no network, or none of that map.
-    InputError
-        If netconvert refuses it, with the first error that it names, crashes or passes a limit.
+        If it is no network, or none of that map; if netconvert refuses it, with the first error
+        that it names, crashes or passes a limit.
     """
     sha256 = digest(content)
 
