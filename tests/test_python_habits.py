@@ -168,8 +168,11 @@ def test_maps_and_runs_are_pictures_with_units(
     assert "run drawn: completed, 30 s simulated in" in caplog.text
     bare, on_map = run.plot().svg, run.plot(entry).svg
     assert ET.fromstring(bare).tag.endswith("svg")
-    assert len(on_map) > 2 * len(bare)
+    assert on_map.count("<path") > bare.count("<path") + 5  # lanes and markings
     assert 'class="cell v' in bare
+    size = dict(re.findall(r'(width|height)="(\d+)"', bare[:300]))
+    assert int(size["width"]) == 900
+    assert 100 < int(size["height"]) < 2000
     table = run.figure_table()
     (speed,) = table.filter(table["name"] == "mean_speed").iter_rows(named=True)
     assert (speed["value"], speed["unit"]) == (run.figures["mean_speed"], "m/s")

@@ -267,6 +267,7 @@ def speed_picture(traces: pl.DataFrame, drawing: MapDrawing | None, *, name: str
         xmlns="http://www.w3.org/2000/svg",
         viewBox=view_box(bounds),
         width=900,
+        height=round(900 * (bounds[3] - bounds[1]) / (bounds[2] - bounds[0])),
         font_family=FONT,
     )
     return f"{svg}\n"
