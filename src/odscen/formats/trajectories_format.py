@@ -37,6 +37,8 @@ def read_tracks(source: ImportSource) -> FileContent:
     report = ElementReport(source.file.name)
     summary = recorded.summary()
     report.add("taken", f"{summary['road_users']} road users", f"schema {recorded.schema}")
+    for column in recorded.unused:
+        report.add("ignored", f"column {column}", "tracks do not need it")
     for note in recorded.notes:
         report.add("approximated", "rows", note)
     others = recorded.rows.filter(recorded.rows["category"].is_null())

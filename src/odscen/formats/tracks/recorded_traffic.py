@@ -74,6 +74,8 @@ class RecordedTraffic:
         ``None`` if the recording has none.
     notes
         What was derived or left out, for people.
+    unused
+        Columns of a table that tracks do not need.
     """
 
     rows: pl.DataFrame
@@ -81,6 +83,7 @@ class RecordedTraffic:
     step: float
     signals: pl.DataFrame | None = None
     notes: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, object]:
         """Road users by category, time, area and quality, as plain values."""

@@ -8,7 +8,7 @@ window, so that a file may be larger than the memory.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import polars as pl
@@ -57,12 +57,15 @@ class TrackFile:
         What was chosen, by name.
     window
         Rows outside are left out.
+    used
+        Columns that have been read.
     """
 
     file: GivenFile
     columns: tuple[str, ...]
     options: Mapping[str, str]
     window: TimeWindow
+    used: set[str] = field(default_factory=set)
 
     def read(
         self,
@@ -74,6 +77,8 @@ class TrackFile:
         table = _scan_table(self.file, columns)
         if where is not None:
             table = table.filter(where)
+        for expression in (*expressions, *(() if where is None else (where,))):
+            self.used.update(expression.meta.root_names())
         inside = pl.col("time").is_between(self.window.begin, self.window.end)
         return _collect_table(self.file, columns, table.select(expressions).filter(inside))
 
@@ -114,21 +119,26 @@ def read_track_table(
         the column and the row.
     """
     with in_file(file.name):
-        columns = _columns_of(file)
-        given = TrackFile(file, columns, options, window)
-        if options.get("columns"):
-            return _read_named_columns(given)
-        if {name.lower() for name in columns} >= _NGSIM_COLUMNS:
-            return _read_ngsim(given)
-        for schema in SCHEMAS:
-            if schema.needed <= set(columns):
-                return schema.read(given)
-        known = ", ".join(("ngsim", *(schema.id for schema in SCHEMAS)))
-        raise InputError(
-            f"its columns are those of no schema that is known ({known}); there are "
-            f"{', '.join(columns)}. "
-            "Name them: --option columns=time=TIME,id=ID,x=X,y=Y"
-        )
+        given = TrackFile(file, _columns_of(file), options, window)
+        recorded = _read_with_schema(given)
+    unused = [name for name in given.columns if name not in given.used]
+    return replace(recorded, unused=tuple(unused))
+
+
+def _read_with_schema(given: TrackFile) -> RecordedTraffic:
+    if given.options.get("columns"):
+        return _read_named_columns(given)
+    columns = set(given.columns)
+    if {name.lower() for name in columns} >= _NGSIM_COLUMNS:
+        return _read_ngsim(given)
+    for schema in SCHEMAS:
+        if schema.needed <= columns:
+            return schema.read(given)
+    known = ", ".join(("ngsim", *(schema.id for schema in SCHEMAS)))
+    raise InputError(
+        f"its columns are those of no schema that is known ({known}); there are "
+        f"{', '.join(given.columns)}. Name them: --option columns=time=TIME,id=ID,x=X,y=Y"
+    )
 
 
 # ----------------------------------------------------------------------------- reading a table
