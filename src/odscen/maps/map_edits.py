@@ -292,7 +292,13 @@ def _is_json(text: str) -> bool:
 
 
 def check_edits(data: object) -> list[MapEdit]:
-    """Edits from a list of objects, as JSON has them; errors as of :func:`read_edits`."""
+    """Edits from a list of objects, as JSON has them.
+
+    Raises
+    ------
+    InputError
+        If an edit is wrong; names the edit, the field and the value.
+    """
     try:
         edits = _EDITS.validate_python(data, strict=False)
     except ValidationError as error:
