@@ -63,6 +63,34 @@ class FoundPart(NamedTuple):
     id: str
 
 
+class PlaceOnMap(NamedTuple):
+    """What is at a place: what one sees before one mends it.
+
+    Attributes
+    ----------
+    road, type
+        Of the lane.
+    width
+        Of the lane there, metres.
+    limit
+        Speed limit there, km/h; ``None`` if there is none.
+    hdg
+        Direction of driving, rad.
+    ring
+        The lane from begin to end of its section, x and y of each corner, metres.
+    parts
+        What is within :data:`REACH`: ``stop_line``, ``crosswalk``, ``light``, ``sign``.
+    """
+
+    road: str
+    type: str
+    width: float
+    limit: float | None
+    hdg: float
+    ring: tuple[tuple[float, float], ...]
+    parts: tuple[str, ...]
+
+
 class EditedMap:
     """A map on which edits are done one after the other.
 
@@ -234,6 +262,43 @@ class EditedMap:
                     away = math.hypot(place[0] - xy[0], place[1] - xy[1])
                     parts.append((away, FoundPart(road.id, signal.id)))
         return self._nearest_part(parts, kind, xy)
+
+    def describe_place(self, x: float, y: float) -> PlaceOnMap:
+        """Say what is at a place.
+
+        Raises
+        ------
+        EditRefusedError
+            If there is no lane.
+        """
+        found = self.find_lane(x, y, None)
+        lane = np.array([found.row])
+        here = self.table.lane_points(lane, np.array([found.s]))
+        speed = float(self.table.speed_limit(lane, np.array([found.s]))[0])
+        s0, s1 = float(self.table.lane_s0[found.row]), float(self.table.lane_s1[found.row])
+        s = np.linspace(s0, s1, max(2, math.ceil((s1 - s0) / 2.0) + 1))
+        sides = [self.table.lane_points(np.full(s.size, found.row), s, at=at) for at in (0.0, 1.0)]
+        left, right = (np.stack([side.x, side.y], axis=1).round(3).tolist() for side in sides)
+        turn = 0.0 if self.table.lane_forward[found.row] else math.pi
+        parts = []
+        for kind in ("stop line", "crosswalk", "light", "sign"):
+            try:
+                if kind in ("light", "sign"):
+                    self.find_signal((x, y), kind)  # type: ignore[arg-type]
+                else:
+                    self.find_object((x, y), kind)  # type: ignore[arg-type]
+            except EditRefusedError:
+                continue
+            parts.append(kind.replace(" ", "_"))
+        return PlaceOnMap(
+            road=self.map.roads[found.key.road].name or str(found.key.road),
+            type=self.table.lane_type[found.row],
+            width=round(float(here.width[0]), 3),
+            limit=round(speed * 3.6, 3) if math.isfinite(speed) else None,
+            hdg=math.remainder(float(here.hdg[0]) + turn, 2.0 * math.pi),
+            ring=tuple((a, b) for a, b in [*left, *right[::-1]]),
+            parts=tuple(parts),
+        )
 
     def _nearest_part(
         self, parts: Sequence[tuple[float, FoundPart]], kind: str, xy: tuple[float, float]
