@@ -292,10 +292,10 @@ def test_a_vehicle_that_starts_beside_all_lanes_is_there_a_step_later(
 def test_those_whom_the_story_drives_overlap_at_first_where_the_file_has_it(
     workspace: Workspace, tmp_path: Path, s: float, spawn: str, ahead: float, overlap: int
 ) -> None:
-    """The ego is 1.4 m ahead of s = 48.6 m, so that it starts 1 m behind node 25."""
+    """The centre of the ego is on node 25, at s = 51 m."""
     found = read(workspace, tmp_path, init=f"{at_first(place(s))}</Private>")
     ego, other = found.scenario.actors
-    assert (ego.spawn, ego.longitudinal_offset) == ("0.0.-1.25", -1.0)
+    assert (ego.spawn, ego.longitudinal_offset) == ("0.0.-1.25", 0.0)
     assert (other.spawn, other.longitudinal_offset) == (spawn, ahead)
     said = [(one.code, one.severity) for one in found.problems if one.code == "bodies_overlap"]
     assert said == [("bodies_overlap", "warning")] * overlap
