@@ -93,7 +93,7 @@ def test_background_traffic_is_added_changed_and_taken_back(
     with user.changing():
         user.page.get_by_label("Time of day at the start").fill("07:30")
         user.page.keyboard.press("Enter")
-    for label, minutes in (("From", "5"), ("Until", "20")):
+    for label, minutes in (("From", "07:35"), ("Until", "07:50")):
         with user.changing():
             background(user).get_by_label(label, exact=True).fill(minutes)
             user.page.keyboard.press("Enter")
