@@ -238,7 +238,7 @@ def test_measures_and_public_transport(
 def test_the_study(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)
-    user.step("Study").click()
+    user.step("Analysis").click()
     user.choose("Kind of station", "Travel-time section")
     user.page.get_by_role("button", name="Choose it on the map").click()
     user.map.click(user.graph.middle("r2"))
@@ -292,7 +292,7 @@ def test_traffic_and_counts(
 ) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)
-    user.step("Traffic").click()
+    user.step("Demand").click()
     with user.changing():
         user.page.get_by_role("button", name="Add background traffic").click()
     user.choose("Day profile", "Weekday")
@@ -335,7 +335,7 @@ def test_traffic_and_counts(
 def test_a_long_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)
-    user.step("Traffic").click()
+    user.step("Demand").click()
     with user.changing():
         user.page.get_by_role("button", name="Add background traffic").click()
     user.step("Run").click()
@@ -390,8 +390,7 @@ def test_the_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -
     inspector.look("run-lights")
     user.page.get_by_role("button", name="Back to the editor").last.click()
     user.wait_for_editor()
-    user.step("Run").click()
-    user.page.get_by_role("button", name="Show the signal programs").click()
+    user.open_first_light()
     expect(user.page.get_by_role("heading", name="Stages")).to_be_visible()
     inspector.look("editor-light")
 

@@ -60,7 +60,7 @@ def test_times_and_a_cordon_are_set_with_the_keyboard_alone(
 ) -> None:
     user.open_editor(crossing)
     keyboard = user.page.keyboard
-    press(user, user.step("Study"))
+    press(user, user.step("Analysis"))
     user.tab_to(user.page.get_by_label("Warm-up that figures leave out"))
     keyboard.press("Control+A")
     keyboard.type("10")

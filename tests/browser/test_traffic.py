@@ -38,7 +38,7 @@ def _write(workspace: Workspace, name: str, scenario: Any) -> None:
 
 def open_traffic(user: OdscenPage, scenario: str) -> None:
     user.open_editor(scenario)
-    user.step("Traffic").click()
+    user.step("Demand").click()
 
 
 def send_table(user: OdscenPage, kind: str, path: Path) -> None:

@@ -102,14 +102,14 @@ export function readMoment(text: string, unit: TimeUnit): number | null | string
   if (a === undefined || b === undefined || Number(b) > 59 || Number(c ?? 0) >= 60) return unreadable(unit);
   const parts = [Number(a), Number(b), Number(c ?? 0)] as const;
   if (!hasClock()) {
-    if (half !== undefined) return t`Set the time of day at the start first, in “Traffic”`;
+    if (half !== undefined) return t`Set the time of day at the start first, in “Demand”`;
     // As they are shown: minutes and seconds, or hours as well.
     return c === undefined ? parts[0] * 60 + parts[1] : parts[0] * 3600 + parts[1] * 60 + parts[2];
   }
   const hour = half === undefined ? parts[0] : (parts[0] % 12) + (half === "p" ? 12 : 0);
   if (hour > 24 || (half !== undefined && parts[0] > 12)) return unreadable(unit);
   const moment = hour * 3600 + parts[1] * 60 + parts[2] - start.clock;
-  // A run that goes on after midnight has the early hours of the next day.
+  // A run beyond midnight has the early hours of the next day.
   if (moment < 0 && moment + DAY <= start.duration) return round(moment + DAY);
   return moment < 0 ? t`Before the start at ${shortClock(0, 0)}` : round(moment);
 }
