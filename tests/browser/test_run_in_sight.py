@@ -47,5 +47,10 @@ def test_run_says_what_hinders_it(user: OdscenPage) -> None:
     user.new_scenario("signal_crossing").click()
     user.wait_for_editor()
     run_of_head(user).click()
+    expect(user.page.get_by_text("Choose the region first: click a road")).to_be_visible()
+    expect(user.step("Region")).to_have_attribute("aria-expanded", "true")
+    with user.changing():
+        user.page.get_by_role("button", name="Take the whole map").click()
+    run_of_head(user).click()
     expect(user.page.get_by_text("There are no road users yet: choose a kind")).to_be_visible()
     expect(user.step("Road users")).to_have_attribute("aria-expanded", "true")

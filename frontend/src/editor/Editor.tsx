@@ -25,6 +25,7 @@ import { useKeys } from "./keys";
 import { isFlow } from "./placing";
 import { Problems } from "./Problems";
 import { RefusalAlert } from "./RefusalAlert";
+import type { Step } from "./scene";
 import { Stage } from "./Stage";
 import type { EditorStore } from "./store";
 import { useRunChoices } from "./runChoices";
@@ -83,8 +84,9 @@ export function Editor({
   const hindrance = hindranceOf(now);
   const run = useLatest(() => {
     if (hindrance) {
-      now.openStep(hindrance.errors ? "run" : ones.length === 0 ? "actors" : "traffic");
-      now.say(hindranceWords(hindrance));
+      const [step, words] = wantedFirst(now, hindrance);
+      now.openStep(step);
+      now.say(words);
     } else starter.start(choices.started);
   });
   const copied = useRef<readonly string[]>([]);
@@ -201,10 +203,15 @@ function hindranceOf({ problems, ones, document: { demand, sumo } }: EditorNow):
   return errors > 0 || empty ? { errors, empty } : null;
 }
 
-const hindranceWords = ({ errors }: Hindrance): string =>
-  errors > 0
-    ? t`${plural(errors, { one: "# problem", other: "# problems" })} to solve first; a click on one in the list shows where.`
-    : t`There are no road users yet: choose a kind, then click on the map.`;
+/** The step in which the first thing that is missing for a run is to be done, and what that is. */
+function wantedFirst({ document }: EditorNow, { errors, empty }: Hindrance): [Step, string] {
+  if (document.roi.length === 0) return ["region", t`Choose the region first: click a road or a junction.`];
+  if (empty) return ["actors", t`There are no road users yet: choose a kind, then click on the map.`];
+  return [
+    "run",
+    t`${plural(errors, { one: "# problem", other: "# problems" })} to solve first; a click on one in the list shows where.`,
+  ];
+}
 
 /** The same function always, which does what the newest one does. */
 function useLatest(act: () => void): () => void {
