@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from odscen.app.editing import Editing
     from odscen.app.exchange.exports import export
     from odscen.app.exchange.imports import ImportedFile, import_file
+    from odscen.app.exchange.recorded_traffic import read_recorded_traffic
     from odscen.app.learner_arrays import scenario_arrays, scenario_from_arrays
     from odscen.app.running.batches import run_many
     from odscen.app.running.reports import renew_report
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from odscen.experiments.suite import read_suite
     from odscen.figures.judging.expectations import Expectation, parse_expectation
     from odscen.formats.base import Format
+    from odscen.formats.tracks.recorded_traffic import RecordedTraffic
     from odscen.lanegraph.query import NearestNode
     from odscen.learning.behaviour.behaviour_model import BehaviourDoor
     from odscen.learning.hetero_data import read_arrays
@@ -99,6 +101,8 @@ _HOMES = {
     "export": "odscen.app.exchange.exports",
     "import_file": "odscen.app.exchange.imports",
     "ImportedFile": "odscen.app.exchange.imports",
+    "read_recorded_traffic": "odscen.app.exchange.recorded_traffic",
+    "RecordedTraffic": "odscen.formats.tracks.recorded_traffic",
     "Format": "odscen.formats.base",
     "Editing": "odscen.app.editing",
     "SceneTemplate": "odscen.scenario.templates.scene_template",
@@ -185,6 +189,7 @@ __all__ = [
     "OdscenError",
     "Problem",
     "Reading",
+    "RecordedTraffic",
     "Recording",
     "ReportEntry",
     "Run",
@@ -217,6 +222,7 @@ __all__ = [
     "parse_expectation",
     "place_template",
     "read_arrays",
+    "read_recorded_traffic",
     "read_scenario",
     "read_suite",
     "renew_report",

@@ -105,6 +105,8 @@ def test_a_dataset_that_was_killed_twice_is_that_of_one_go(tmp_path: Path) -> No
             made(killed, asked, executor)
         ran += executor.ran
         assert not (killed / "README.md").exists()
+    run = next((killed / "staged" / "scenarionet").iterdir())
+    (run / ".dataset_mapping.pkl.1.part").write_bytes(b"half of")  # as a kill leaves it
     last = MadeUpExports()
     made(killed, asked, last)
     assert sorted(ran + last.ran) == sorted({*ran, *last.ran})

@@ -5,12 +5,12 @@ from __future__ import annotations
 import io
 import math
 import zipfile
-import zlib
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.base.errors import InputError
+from odscen.base.given_files import UNREADABLE_ARCHIVE
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -53,7 +53,7 @@ def arrays_from_npz(
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return _read_arrays(archive, file, only)
-    except (zipfile.BadZipFile, EOFError, OSError, RuntimeError) as error:
+    except UNREADABLE_ARCHIVE as error:
         raise InputError("it cannot be read as an .npz file", file=file) from error
 
 
@@ -74,7 +74,7 @@ def _read_arrays(
         try:
             with archive.open(members[name]) as stream:
                 found[name] = _read_array(stream, members[name].file_size)
-        except (ValueError, zlib.error, zipfile.BadZipFile, NotImplementedError) as error:
+        except UNREADABLE_ARCHIVE as error:
             raise InputError(
                 f"it is malformed: {error}", file=file, element=f"array {name}"
             ) from error

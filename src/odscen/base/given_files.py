@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+import zipfile
+import zlib
 from pathlib import Path
 from typing import TypeAlias
 
@@ -17,6 +19,12 @@ GivenPath: TypeAlias = str | os.PathLike[str]
 
 MOST = 256_000_000
 """Bytes; a scenario of 200,000 actors has a fifth of it."""
+
+UNREADABLE_ARCHIVE = (
+    zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSError, RuntimeError,
+    ValueError,
+)  # fmt: skip
+"""What ``zipfile`` raises for a damaged archive: a negative place in it is a ``ValueError``."""
 
 
 def as_path(given: GivenPath) -> Path:

@@ -90,9 +90,14 @@ def write_shards(
 
 
 def _staged_files(folder: Path) -> list[Path]:
-    """Files that a run was exported to, as they were written."""
+    """Files that a run was exported to, as they were written.
+
+    Hidden ones are none of them: what a process that was killed had begun to write.
+    """
     check_files(folder)
-    return sorted(path for path in folder.iterdir() if path.name != SUMS_FILE)
+    return sorted(
+        path for path in folder.iterdir() if path.name != SUMS_FILE and path.name[0] != "."
+    )
 
 
 def _plain_array(shape: tuple[int, ...], kind: str, content: bytearray) -> Any:

@@ -231,6 +231,10 @@ class GivenFile(Protocol):
     def where(self) -> str:
         """What messages call it."""
 
+    @property
+    def on_disk(self) -> Path:
+        """Where it lies, for readers that take a part of it at a time; it may not be there."""
+
     def read(self, *, most: int = MOST) -> bytes:
         """Its content.
 
@@ -359,8 +363,8 @@ class FileContent(NamedTuple):
     scenario
         The document.
     tracks
-        Columns ``time`` (s), ``id``, ``x``, ``y`` (m) and perhaps ``hdg`` (rad, counter-clockwise
-        from +x) of body centres in the OpenDRIVE frame, as those of a run.
+        Columns ``time`` (s), ``id``, ``x``, ``y`` (m), ``hdg`` (rad, counter-clockwise from +x) of
+        body centres in the frame of the file, and what else it has of road users.
     lists
         Elements of the file by their verdict; empty of formats that are always taken whole.
     plan

@@ -26,7 +26,8 @@ _LOST: tuple[tuple[LossKind, str], ...] = (
     ("connections", "connecting lane "),
     ("connections", "no vehicle class may use"),
     ("lanes_both_ways", "open both ways"),
-    ("access_rules", "access"),
+    ("access_rules", "access: "),
+    ("access_rules", "access of "),
     ("crosswalks", "crosswalk"),
 )
 _GUESSED: tuple[tuple[LossKind, str], ...] = (

@@ -160,7 +160,14 @@ def test_a_feed_needs_a_day_and_an_archive_that_is_whole(
     file = feed(workspace, tmp_path)
     with pytest.raises(InputError, match="has a calendar; name a day"):
         import_transit(workspace, scenario, file)
-    file.write_bytes(file.read_bytes()[:300])
+    whole = file.read_bytes()
+    file.write_bytes(whole[:300])
+    with pytest.raises(InputError, match="no zip archive that can be read"):
+        import_transit(workspace, scenario, file, day=MONDAY)
+    # as after a loss of 21 bytes: members begin before the file does
+    at = whole.rindex(b"PK\x05\x06") + 16
+    begin = int.from_bytes(whole[at : at + 4], "little") + 21
+    file.write_bytes(whole[:at] + begin.to_bytes(4, "little") + whole[at + 4 :])
     with pytest.raises(InputError, match="no zip archive that can be read"):
         import_transit(workspace, scenario, file, day=MONDAY)
 

@@ -5,7 +5,12 @@ import pytest
 from pydantic import TypeAdapter
 
 from odscen.base.errors import ScenarioError
-from odscen.scenario.document.distributions import Uniform, WrittenDistribution, draw_place
+from odscen.scenario.document.distributions import (
+    Normal,
+    Uniform,
+    WrittenDistribution,
+    draw_place,
+)
 from odscen.scenario.document.sampling_config import loads_config
 
 
@@ -56,3 +61,8 @@ def test_weights_whose_sum_is_no_number_are_refused_where_they_are_read(text: st
 def test_what_is_written_of_a_distribution_is_read_as_strictly_as_documents_are(text: str) -> None:
     kinds: TypeAdapter[object] = TypeAdapter(WrittenDistribution)
     assert kinds.dump_json(kinds.validate_json(text, strict=True)).decode() == text
+
+
+def test_a_deviation_of_minus_zero_is_none() -> None:
+    rng = np.random.default_rng(0)
+    assert Normal(mean=1.5, std=-0.0, low=1.0, high=2.0).draw(rng) == 1.5

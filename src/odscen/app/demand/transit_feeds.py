@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import io
 import zipfile
-import zlib
 from typing import TYPE_CHECKING
 
 from odscen.app.maps import map_of
 from odscen.base.errors import InputError, in_file
-from odscen.base.given_files import MOST, read_given, read_given_text
+from odscen.base.given_files import MOST, UNREADABLE_ARCHIVE, read_given, read_given_text
 from odscen.formats.gtfs_feed import CALENDARS, NEEDED, read_feed
 from odscen.formats.gtfs_lines import place_feed
 from odscen.opendrive.parse import parse
@@ -136,9 +135,9 @@ def _read_feed_tables(file: Path) -> dict[str, str]:
                         )
                     found[name] = archive.read(member).decode("utf-8")
             return found
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
-        raise InputError(f"this is no zip archive that can be read: {error}") from error
     except UnicodeDecodeError as error:
         raise InputError(
             f"a table is not text in UTF-8: byte {error.start} is {error.object[error.start]:#04x}"
         ) from error
+    except UNREADABLE_ARCHIVE as error:
+        raise InputError(f"this is no zip archive that can be read: {error}") from error

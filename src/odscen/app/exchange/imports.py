@@ -55,8 +55,8 @@ class ImportedFile(NamedTuple):
     scenario
         The document; ``None`` if the file has tracks.
     tracks
-        Table of ``time`` (s), ``id``, ``x``, ``y`` (m) and perhaps ``hdg`` (rad) of body centres in
-        the OpenDRIVE frame; ``None`` if the file has a scenario.
+        Table of tracks, see :data:`~odscen.formats.tracks.recorded_traffic.TRACK_COLUMNS`; ``None``
+        if the file has a scenario.
     lists
         Elements of the file, each with a reason, by what has become of them: ``taken``,
         ``approximated``, ``ignored`` and ``refused``; empty of formats that are always taken whole.
@@ -362,6 +362,11 @@ class DiskFile:
     def where(self) -> str:
         """The file with its folder."""
         return str(self.path)
+
+    @property
+    def on_disk(self) -> Path:
+        """The same, as a path."""
+        return self.path
 
     def read(self, *, most: int = MOST) -> bytes:
         """Its content."""

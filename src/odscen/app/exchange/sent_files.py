@@ -328,6 +328,11 @@ class _FileAmongSent:
         """The same."""
         return self.name
 
+    @property
+    def on_disk(self) -> Path:
+        """Where the server keeps it."""
+        return self.given[self.row][1]
+
     def read(self, *, most: int = MOST) -> bytes:
         """Its content."""
         try:

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from odscen.app.exchange.recorded_traffic import read_recorded_traffic
 from odscen.base.errors import ScenarioError, in_file
-from odscen.base.given_files import read_given
-from odscen.formats.trajectories_format import read_trajectories_table, trajectory_rows
-from odscen.runs.finished_run import Run
+from odscen.formats.trajectories_format import trajectory_rows
 from odscen.scenario.document.problems import validated
 from odscen.scenario.document.rules_document import StoryRule
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import polars as pl
-
     from odscen.scenario.document.scenario_document import Scenario
-
-PARQUET = ".parquet"
 
 
 def attach_trajectory(
@@ -37,7 +32,7 @@ def attach_trajectory(
     Parameters
     ----------
     source
-        CSV or Parquet, see :mod:`odscen.formats.trajectories_format`, or the folder of a run.
+        As of :func:`~odscen.app.exchange.recorded_traffic.read_recorded_traffic`.
     of
         Who was recorded; not needed if there is one only.
     begin
@@ -55,7 +50,7 @@ def attach_trajectory(
         known = ", ".join(actor.id for actor in scenario.actors[:8]) or "none"
         raise ScenarioError(f"there is no actor {actor!r}; there are {known}")
     with in_file(str(source)):
-        recorded, rows = trajectory_rows(_read_table(source), of=of)
+        recorded, rows = trajectory_rows(read_recorded_traffic(source).rows, of=of)
     name, step = f"replay-{actor}", scenario.simulation.step_length
     starts = max(recorded if begin is None else begin, step)
     (_, x, y, hdg), (seconds, x1, y1, _) = rows[:2]
@@ -75,10 +70,3 @@ def attach_trajectory(
     )
     others = tuple(rule for rule in scenario.rules if rule.id != name)
     return scenario.model_copy(update={"rules": (*others, rule)})
-
-
-def _read_table(source: Path) -> pl.DataFrame:
-    if source.is_dir():
-        return Run.open(source).trajectories()
-    parquet = source.suffix.lower() == PARQUET
-    return read_trajectories_table(read_given(source), parquet=parquet)

@@ -77,8 +77,9 @@ class Normal(Part):
 
     def draw(self, rng: np.random.Generator) -> float:
         """Draw a number."""
+        std = abs(self.std)  # -0.0 is not below 0, but numpy refuses it
         for _ in range(_RETRIES):
-            value = float(rng.normal(self.mean, self.std))
+            value = float(rng.normal(self.mean, std))
             if self.low <= value <= self.high:
                 return value
         return min(max(self.mean, self.low), self.high)

@@ -1,0 +1,1 @@
+"""Recorded traffic of others as one table of tracks: readers and writers by published schema."""

@@ -1,0 +1,82 @@
+"""Recorded traffic read, whatever its file is: tables, OSI traces, CommonRoad."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING, Final
+
+from odscen.base.errors import InputError, in_file
+from odscen.formats.tracks.table_schemas import TimeWindow, read_track_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from odscen.formats.base import GivenFile
+    from odscen.formats.tracks.recorded_traffic import RecordedTraffic
+
+SUFFIXES: Final = (".csv", ".parquet", ".osi", ".mcap", ".xml")
+_CLOCK = re.compile(r"(?:(?:(\d+):)?(\d{1,2}):)?(\d+(?:\.\d*)?)")
+
+
+def read_recording(file: GivenFile, options: Mapping[str, str] | None = None) -> RecordedTraffic:
+    """Tracks of a file of recorded traffic.
+
+    Parameters
+    ----------
+    options
+        ``window`` (see :func:`time_window`), ``columns`` (of a table of no published schema:
+        ``time=ms*0.001,id=vehicle,x=east,y=north``), ``case`` and ``location`` (which of several
+        recordings that a file of INTERACTION or NGSIM has).
+
+    Raises
+    ------
+    InputError
+        If it is nothing of these, or damaged; names the file, the element and the value.
+    MissingDependencyError
+        If it needs a package that is not installed.
+    """
+    from odscen.formats.tracks.commonroad_obstacles import read_commonroad_obstacles
+    from odscen.formats.tracks.osi_trace import read_osi_trace
+
+    options = options or {}
+    window = time_window(options.get("window", ""))
+    name = file.name.lower()
+    with in_file(file.name):
+        if name.endswith((".osi", ".mcap")):
+            return read_osi_trace(file.on_disk, *window)
+        if name.endswith(".xml"):
+            return read_commonroad_obstacles(file.read(), *window)
+        return read_track_table(file, options, window)
+
+
+def time_window(text: str) -> TimeWindow:
+    """Window of ``FROM..TO``: seconds of the file, or minutes and hours, as in ``1:02:03.5``.
+
+    >>> time_window("12:30..13:00")
+    TimeWindow(begin=750.0, end=780.0)
+
+    Raises
+    ------
+    InputError
+        If it is none, or ends before it begins.
+    """
+    if not text:
+        return TimeWindow()
+    begin, dots, end = (part.strip() for part in text.partition(".."))
+    if not dots:
+        raise InputError(f"a window is FROM..TO, not {text!r}")
+    window = TimeWindow(_seconds(begin, -math.inf), _seconds(end, math.inf))
+    if window.end <= window.begin:
+        raise InputError(f"the window {text!r} ends before it begins")
+    return window
+
+
+def _seconds(text: str, usual: float) -> float:
+    if not text:
+        return usual
+    found = _CLOCK.fullmatch(text)
+    if found is None:
+        raise InputError(f"{text!r} is neither seconds nor H:MM:SS")
+    hours, minutes, seconds = (float(part or 0) for part in found.groups())
+    return 3600.0 * hours + 60.0 * minutes + seconds
