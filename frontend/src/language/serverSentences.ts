@@ -606,6 +606,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "is {lengths} m long on {extent} m of its road; all lanes together are {total} m, the limit is {most} m; {more_lanes}" }),
   msg({ message: "it appears where it is placed" }),
   msg({ message: "it appears where it is placed, as {x}, {y} is on no lane" }),
+  msg({ message: "it begins or ends at lanes that are closed to motor vehicles" }),
   msg({ message: "it bends more tightly than it is wide" }),
   msg({ message: "it cannot appear: it has no route, or it was there" }),
   msg({ message: "it cannot be imported from {value}: {error}" }),
