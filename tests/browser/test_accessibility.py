@@ -187,7 +187,15 @@ def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str
     user.wait_for_editor()
     inspector.look("editor-new")
     user.open_editor(sampled)
-    for step in ("Map", "Region", "Weather and time", "Road users", "Traffic", "Run"):
+    for step in (
+        "Map",
+        "Region",
+        "Weather and time",
+        "Road users",
+        "Demand",
+        "Traffic lights",
+        "Run",
+    ):
         user.step(step).click()
         inspector.look("editor-" + step.lower().replace(" ", "-"))
     user.step("Weather and time").click()
