@@ -41,7 +41,7 @@ test("without a clock minutes and seconds are minutes and seconds, not a number 
   expect(readMoment("1:10:05", "s")).toBe(4205);
   expect(readMoment("7,5", "min")).toBe(450);
   expect(readMoment("soon", "min")).toBe("A number, such as 15 min");
-  expect(readMoment("10:00 am", "min")).toBe("Set the time of day at the start first, in “Traffic”");
+  expect(readMoment("10:00 am", "min")).toBe("Set the time of day at the start first, in “Demand”");
   expect(clock(75.04)).toBe("1:15.0");
 });
 
