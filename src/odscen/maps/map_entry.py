@@ -109,7 +109,13 @@ class MapEntry:
     @property
     def importing(self) -> ImportSettings:
         """How it was imported."""
-        return ImportSettings(self.importer, self.info.get("import", {}).get("options", {}))
+        record = self.info.get("import", {})
+        return ImportSettings(self.importer, record.get("options", {}), record.get("edits"))
+
+    def edit_rows(self) -> list[dict[str, Any]]:
+        """Rows of the import report on the edits that mend it, in their order."""
+        rows = self.info["report"]["entries"] if self.importing.edits else []
+        return [row for row in rows if str(row.get("source_id")).startswith("edit ")]
 
     @property
     def net_sha256(self) -> str:
