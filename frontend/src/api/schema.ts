@@ -3609,11 +3609,14 @@ export interface components {
         /**
          * @description ``digest`` is the same where scenarios differ at most in name and description.
          *
-         *     ``counts`` is how many counts of vehicles the scenario has.
+         *     ``counts`` is how many counts of vehicles the scenario has, ``clock`` the time of day at the
+         *     start, seconds, 0 without one.
          */
         RunContent: {
             digest: string;
             counts: number;
+            /** @default 0 */
+            clock: number;
         };
         /**
          * @description Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
@@ -3683,7 +3686,8 @@ export interface components {
          *     ``finished`` is when its results were written, in seconds since 1970. ``preparing`` says how far
          *     routes by travel time have been found before it begins. ``carla`` says that it is
          *     shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
-         *     ``slices``; one that is ``interrupted`` can go on from the last of them.
+         *     ``slices``; one that is ``interrupted`` can go on from the last of them. ``clock`` is the time
+         *     of day at the start, seconds, while the server still has the scenario (see ``RunContent``).
          */
         RunInfo: {
             run: string;
@@ -3700,6 +3704,7 @@ export interface components {
             carla: boolean;
             slices: components["schemas"]["RunSlices"] | null;
             preparing: string | null;
+            clock: number | null;
         };
         /**
          * @description What vehicles did on each lane in each interval of a run.

@@ -3,7 +3,9 @@ import { Checkbox, Group, Select, Stack } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import type { Actor, Assets, Edit } from "../api/types";
 import { DRIVERS, modelWord, styleChoices } from "../ui/words";
+import { hasClock } from "../language/moments";
 import { Committed } from "./Committed";
+import { MomentField } from "./MomentField";
 import { bodyOf } from "./scene";
 import { Silhouette } from "./Silhouette";
 
@@ -56,12 +58,10 @@ export function ActorForm({
           value={actor.speed === null ? "" : actor.speed * 3.6}
           onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })}
         />
-        <Committed
-          label={t`Departs after`}
-          suffix={" s"}
-          min={0}
-          max={86_400}
-          digits={1}
+        <MomentField
+          label={hasClock() ? t`Departs at` : t`Departs after`}
+          unit="s"
+          step={1}
           value={actor.depart}
           onCommit={(value) => change({ depart: value ?? 0 })}
         />
@@ -192,14 +192,12 @@ export function ManyForm({
           value={speed ? speed * 3.6 : ""}
           onCommit={(value) => onChange({ speed: value === null ? null : value / 3.6 }, t`Speed`)}
         />
-        <Committed
-          label={t`All depart after`}
-          suffix={" s"}
-          min={0}
-          max={86_400}
-          digits={1}
+        <MomentField
+          label={hasClock() ? t`All depart at` : t`All depart after`}
+          unit="s"
+          step={1}
           placeholder={t`different`}
-          value={same("depart") ?? ""}
+          value={same("depart") ?? null}
           onCommit={(value) => onChange({ depart: value ?? 0 }, t`Departure`)}
         />
       </Group>

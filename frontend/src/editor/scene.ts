@@ -4,21 +4,16 @@ import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
 import type { SceneActor, SceneFlow, SegmentStyle } from "../map/scene";
 
-export const STEPS = [
-  "map",
-  "region",
-  "environment",
-  "actors",
-  "traffic",
-  "transit",
-  "measures",
-  "rules",
-  "parameters",
-  "study",
-  "criteria",
-  "run",
-] as const;
-export type Step = (typeof STEPS)[number];
+/** The steps of the editor in their groups, both in the order in which one usually goes. */
+export const STEP_GROUPS = {
+  place: ["map", "region", "environment"],
+  traffic: ["actors", "traffic", "transit"],
+  control: ["lights", "measures", "rules"],
+  evaluate: ["parameters", "study", "criteria", "run"],
+} as const;
+export type StepGroup = keyof typeof STEP_GROUPS;
+export type Step = (typeof STEP_GROUPS)[StepGroup][number];
+export const STEPS: readonly Step[] = Object.values(STEP_GROUPS).flat();
 
 /** How each segment is drawn: the first of the region dark blue, what may be added light blue. */
 export function segmentStyles(
