@@ -5,6 +5,9 @@ import { localized } from "../language/localized";
 import { IconCheck } from "../ui/icons";
 import { type Step, STEP_GROUPS, type StepGroup } from "./scene";
 
+/** Pixels of a window in which all lies below each other; those of narrow.css. */
+const NARROW = 900;
+
 export interface StepText {
   title: string;
   note: string;
@@ -32,7 +35,10 @@ export function Steps({
   const list = useRef<HTMLDivElement>(null);
   const id = useId();
   useEffect(() => {
-    list.current?.querySelector("[aria-expanded=true]")?.scrollIntoView({ block: "nearest" });
+    const head = list.current?.querySelector("[aria-expanded=true]");
+    // Where the page itself scrolls, a long form must not push its heading below the map.
+    if (innerWidth <= NARROW) return head?.scrollIntoView({ block: "start" });
+    head?.scrollIntoView({ block: "nearest" });
     list.current?.querySelector(".step-body")?.scrollIntoView({ block: "nearest" });
   }, [open]);
   return (
