@@ -16,8 +16,8 @@ from playwright.sync_api import Page, expect
 
 from odscen.app.running import batches
 from odscen.app.scenarios import SUFFIX, generate
-from odscen.experiments.compare import compare_runs, read_runs
 from odscen.experiments.comparison_page import comparison_page
+from odscen.experiments.comparisons import compare_runs, read_runs
 from odscen.experiments.plan import StudyPlan, StudyRuns, StudyVariant
 from odscen.experiments.studies import begin_study_of, carry_out_study
 from odscen.experiments.work import LocalExecutor

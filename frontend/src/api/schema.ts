@@ -793,8 +793,10 @@ export interface components {
          *     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-         *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+         *     positive to the left of the driving direction, ``longitudinal_offset`` in it: metres from the
+         *     node to the centre of the body. ``size`` is that of its body; ``None`` is that of its model, or
+         *     the usual one of its category. ``style`` is a driving style or the id of a driver set of the
+         *     scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
          *     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
          *     their order; an open goal is one that can be reached from the last of them. ``driver`` is who
          *     drives a vehicle that no rule moves: SUMO, or the ``story`` alone, which keeps its initial speed
@@ -811,6 +813,9 @@ export interface components {
             speed: number | null;
             /** @default 0 */
             lateral_offset: number;
+            /** @default 0 */
+            longitudinal_offset: number;
+            size: components["schemas"]["BodySize-Output"] | null;
             /** @default 0 */
             depart: number;
             initial_speed: number | null;
@@ -858,6 +863,8 @@ export interface components {
             via?: string[];
             speed?: number | null;
             lateral_offset?: number;
+            longitudinal_offset?: number;
+            size?: components["schemas"]["BodySize-Input"] | null;
             depart?: number;
             initial_speed?: number | null;
             style?: string;
@@ -1095,6 +1102,18 @@ export interface components {
             width: number;
             height: number;
         };
+        /** @description Bounding box of a road user, metres; without a height it has that of its category. */
+        "BodySize-Input": {
+            length: number;
+            width: number;
+            height?: number | null;
+        };
+        /** @description Bounding box of a road user, metres; without a height it has that of its category. */
+        "BodySize-Output": {
+            length: number;
+            width: number;
+            height: number | null;
+        };
         Body_add_map_api_maps_post: {
             /** @description A map of any format of `/map-importers`. */
             file: string;
@@ -1191,6 +1210,8 @@ export interface components {
             via?: string[];
             speed?: number | null;
             lateral_offset?: number;
+            longitudinal_offset?: number;
+            size?: components["schemas"]["BodySize-Input"] | null;
             depart?: number;
             initial_speed?: number | null;
             style?: string;

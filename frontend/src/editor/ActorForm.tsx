@@ -9,6 +9,11 @@ import { MomentField } from "./MomentField";
 import { bodyOf } from "./scene";
 import { Silhouette } from "./Silhouette";
 
+/** The body that was typed; an emptied field gives back the usual one. */
+function sized(actor: Actor, length: number | null, width: number | null): Actor["size"] {
+  return length === null || width === null ? null : { length, width, height: actor.size?.height ?? null };
+}
+
 /** What one road user is and how it moves. */
 export function ActorForm({
   actor,
@@ -72,6 +77,40 @@ export function ActorForm({
             digits={2}
             value={actor.lateral_offset}
             onCommit={(value) => change({ lateral_offset: value ?? 0 })}
+          />
+          <Committed
+            label={t`Offset ahead`}
+            suffix={" m"}
+            min={-10}
+            max={10}
+            step={0.1}
+            digits={2}
+            value={actor.longitudinal_offset}
+            onCommit={(value) => change({ longitudinal_offset: value ?? 0 })}
+          />
+        </Group>
+      )}
+      {!walks && (
+        <Group grow align="flex-start">
+          <Committed
+            label={t`Length`}
+            suffix={" m"}
+            min={0.1}
+            max={30}
+            step={0.1}
+            digits={2}
+            value={length}
+            onCommit={(value) => change({ size: sized(actor, value, width) })}
+          />
+          <Committed
+            label={t`Width`}
+            suffix={" m"}
+            min={0.1}
+            max={5}
+            step={0.05}
+            digits={2}
+            value={width}
+            onCommit={(value) => change({ size: sized(actor, length, value) })}
           />
           <Select
             label={t`Driving style`}
