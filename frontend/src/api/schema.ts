@@ -1334,8 +1334,8 @@ export interface components {
          */
         "Condition-Input": {
             time?: components["schemas"]["AfterTime"] | null;
-            ttc?: components["schemas"]["PairBounded-Input"] | null;
-            headway?: components["schemas"]["PairBounded-Input"] | null;
+            ttc?: components["schemas"]["SecondsBetween-Input"] | null;
+            headway?: components["schemas"]["SecondsBetween-Input"] | null;
             distance?: components["schemas"]["DistanceBounded-Input"] | null;
             relative_speed?: components["schemas"]["PairBounded-Input"] | null;
             speed?: components["schemas"]["OwnBounded-Input"] | null;
@@ -1368,8 +1368,8 @@ export interface components {
          */
         "Condition-Output": {
             time: components["schemas"]["AfterTime"] | null;
-            ttc: components["schemas"]["PairBounded-Output"] | null;
-            headway: components["schemas"]["PairBounded-Output"] | null;
+            ttc: components["schemas"]["SecondsBetween-Output"] | null;
+            headway: components["schemas"]["SecondsBetween-Output"] | null;
             distance: components["schemas"]["DistanceBounded-Output"] | null;
             relative_speed: components["schemas"]["PairBounded-Output"] | null;
             speed: components["schemas"]["OwnBounded-Output"] | null;
@@ -3980,6 +3980,36 @@ export interface components {
             label: string;
             undo: string | null;
             redo: string | null;
+        };
+        /**
+         * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
+         *
+         *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         */
+        "SecondsBetween-Input": {
+            below?: number | null;
+            above?: number | null;
+            of?: string | null;
+            to: string;
+            /** @default true */
+            free?: boolean;
+            /** @default false */
+            ahead?: boolean;
+        };
+        /**
+         * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
+         *
+         *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         */
+        "SecondsBetween-Output": {
+            below: number | null;
+            above: number | null;
+            of: string | null;
+            to: string;
+            /** @default true */
+            free: boolean;
+            /** @default false */
+            ahead: boolean;
         };
         /** @description A segment and its neighbours, which are rows. */
         SegmentInfo: {

@@ -4,6 +4,7 @@ import { msg } from "@lingui/core/macro";
 
 /** Sentences that the server makes; in braces is what it inserts. */
 export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
+  msg({ message: "(only ahead)" }),
   msg({ message: "({trips} trips)" }),
   msg({ message: "--build-memory {more} (GB), or {memory_variable}={more2}" }),
   msg({ message: "--build-minutes {more}, or {minutes_variable}={more2}" }),
@@ -405,6 +406,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "bend by more than {bend} degrees" }),
   msg({ message: "between bodies, not reference points" }),
   msg({ message: "between centres, not reference points" }),
+  msg({ message: "between centres, not reference points: up to {apart} m otherwise" }),
   msg({ message: "bicycle" }),
   msg({ message: "bicycle {value} of {width} m" }),
   msg({ message: "bicycles may use it too, which a sidewalk of OpenDRIVE does not say" }),
@@ -1307,7 +1309,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "the format {to} cannot say what happened in a run; {able} can" }),
   msg({ message: "the format {to} says what happened in a run: name the folder of one" }),
   msg({ message: "the gap in front of it is not reached by itself" }),
-  msg({ message: "the gap is kept without end" }),
+  msg({ message: "the gap is kept until another action takes the speed" }),
   msg({ message: "the goal of {actor} has to be {where}; {node} is on {other}" }),
   msg({ message: "the graph form is" }),
   msg({ message: "the headway is {headway} s, but a step lasts {step} s: SUMO cannot keep vehicles that are closer from colliding; raise the headway or shorten the step" }),

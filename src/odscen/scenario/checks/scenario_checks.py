@@ -64,11 +64,13 @@ class _Start(NamedTuple):
     lateral_offset: float
     longitudinal_offset: float
     body: Body
+    alone: str = ""
+    """Id of one that the story drives, and that so waits for nobody."""
 
     @property
-    def place(self) -> tuple[str, float]:
+    def place(self) -> tuple[str, float, str]:
         """Where those wait behind one another who depart together."""
-        return self.spawn, self.longitudinal_offset
+        return self.spawn, self.longitudinal_offset, self.alone
 
 
 class _Window(NamedTuple):
@@ -76,7 +78,7 @@ class _Window(NamedTuple):
 
     crowd: Crowd
     known: dict[_Start, int]
-    places: list[tuple[str, float]]
+    places: list[tuple[str, float, str]]
     actors: list[list[int]]
 
     def add(self, start: _Start, box: Box, actor: int) -> None:
@@ -138,7 +140,8 @@ def _find_overlapping(
     windows: dict[int, _Window] = {}
     boxes: dict[_Start, Box] = {}
     for index, (actor, body) in enumerate(zip(scenario.actors, bodies, strict=True)):
-        start = _Start(actor.spawn, actor.lateral_offset, actor.longitudinal_offset, body)
+        alone = actor.id if actor.driver == "story" else ""
+        start = _Start(actor.spawn, actor.lateral_offset, actor.longitudinal_offset, body, alone)
         if start not in boxes:
             place = region.place(actor.spawn)
             if place is None:

@@ -287,7 +287,7 @@ def test_a_vehicle_that_starts_beside_all_lanes_is_there_a_step_later(
 
 @pytest.mark.parametrize(
     ("s", "spawn", "ahead", "overlap"),
-    [(51, "0.0.-1.25", 0.0, 1), (54, "0.0.-1.26", 1.0, 1), (60, "0.0.-1.30", -1.0, 0)],
+    [(51, "0.0.-1.25", 0.0, 1), (54, "0.0.-1.27", -1.0, 1), (60, "0.0.-1.30", -1.0, 0)],
 )
 def test_those_whom_the_story_drives_overlap_at_first_where_the_file_has_it(
     workspace: Workspace, tmp_path: Path, s: float, spawn: str, ahead: float, overlap: int

@@ -118,6 +118,7 @@ def test_bodies_have_their_size_and_start_exactly_where_they_are_put(tmp_path: P
     assert gap_at_start(found) == pytest.approx(30.0, abs=0.01)
     [hit] = [one for one in found.events if one.kind == "collision"]
     assert hit.time == pytest.approx(2.5, abs=0.01)
+    assert (hit.values or {})["overlap"] == pytest.approx(0.5, abs=0.01)
 
 
 def test_who_overlaps_at_first_is_told_and_those_whom_the_story_drives_may(tmp_path: Path) -> None:
