@@ -157,7 +157,7 @@ export function useEditing(
     actors,
     flows,
     starts,
-    sizeOf: (category) => bodyOf({ category, model: null }, assets),
+    sizeOf: (category) => bodyOf({ category, model: null, size: null }, assets),
     selection,
     one,
     goals,
