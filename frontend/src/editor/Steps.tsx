@@ -37,9 +37,11 @@ export function Steps({
   useEffect(() => {
     const head = list.current?.querySelector("[aria-expanded=true]");
     // Where the page itself scrolls, a long form must not push its heading below the map.
-    if (innerWidth <= NARROW) return head?.scrollIntoView({ block: "start" });
-    head?.scrollIntoView({ block: "nearest" });
-    list.current?.querySelector(".step-body")?.scrollIntoView({ block: "nearest" });
+    if (innerWidth <= NARROW) void head?.scrollIntoView({ block: "start" });
+    else {
+      void head?.scrollIntoView({ block: "nearest" });
+      void list.current?.querySelector(".step-body")?.scrollIntoView({ block: "nearest" });
+    }
   }, [open]);
   return (
     <div className="steps" ref={list}>
