@@ -115,7 +115,7 @@ def test_hostile_arguments_get_nowhere(tmp_path: Path) -> None:
                 await refused(client, "draw_map", map_name=name)
             edit = {"kind": "import_module", "module": "os"}
             await refused(client, "edit_scenario", scenario="none", edits=[edit])
-            assert "there is no edit" in await refused(client, "list_edits", kind="__class__")
+            assert "no edit named" in await refused(client, "list_edits", kind="__class__")
             assert "steps must lie between 2 and 50" in await refused(
                 client, "vary_scenario", scenario="none", name="n", parameter="p",
                 low=0.0, high=1.0, steps=10**9,
