@@ -1,28 +1,20 @@
 """Recorded traffic: tracks of road users in the schemas of datasets, OSI traces, CommonRoad.
 
-What is read is in :mod:`odscen.formats.tracks`; this is the entry in the list of formats, and the
-track of one road user as rows of a rule.
+What is read is in :mod:`odscen.formats.tracks`; this is the entry in the list of formats.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError
 from odscen.formats.base import ElementReport, FileContent, Format, FormatOption
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from odscen.formats.base import ImportSource
-    from odscen.scenario.document.rules_document import TrajectoryRow
 
-MOST_ROWS = 100_000
 FOLLOWS = ("track", "react", "drive")
 """What a road user of a recording does: follows its track; until the ego is close; never."""
-_LISTED = 8
-"""Names that a message lists at most."""
 
 
 def read_tracks(source: ImportSource) -> FileContent:
@@ -66,41 +58,6 @@ def read_tracks(source: ImportSource) -> FileContent:
         report=report,
     )
     return FileContent(scenario=scenario, lists=report.lists)
-
-
-def trajectory_rows(
-    tracks: pl.DataFrame, *, of: str | None = None
-) -> tuple[float, tuple[TrajectoryRow, ...]]:
-    """Trajectory of one road user: when it begins, and rows of seconds from then on.
-
-    Parameters
-    ----------
-    tracks
-        ``id``, ``time`` (s), ``x``, ``y`` (m) and ``hdg`` (rad) of body centres.
-    of
-        Its id in the table; not needed if there is one only.
-
-    Raises
-    ------
-    InputError
-        If there is no such road user, or it has fewer than two rows, or too many.
-    """
-    import polars as pl
-
-    ids = tracks["id"].unique().sort().to_list()
-    if of is None and len(ids) != 1:
-        listed = ", ".join(map(str, ids[:_LISTED])) + (", ..." if len(ids) > _LISTED else "")
-        raise InputError(f"there are {len(ids)} road users: {listed}; name one")
-    if of is not None and of not in ids:
-        raise InputError(f"there is no road user {of!r}")
-    own = tracks.filter(pl.col("id") == (ids[0] if of is None else of)).sort("time")
-    if not 2 <= own.height <= MOST_ROWS:
-        raise InputError(f"{own.height} rows; a trajectory has 2 to {MOST_ROWS}")
-    begin = float(own["time"][0])
-    return begin, tuple(
-        (round(time - begin, 6), x, y, math.remainder(hdg, math.tau))
-        for time, x, y, hdg in own.select("time", "x", "y", "hdg").iter_rows()
-    )
 
 
 FORMAT = Format(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -13,16 +13,19 @@ import polars as pl
 from odscen.base.categories import DEFAULT_BODY, Body, Category
 from odscen.base.errors import InputError
 from odscen.formats.tracks.lane_places import LaneFinder
-from odscen.formats.trajectories_format import trajectory_rows
+from odscen.formats.tracks.recorded_traffic import trajectory_rows
 from odscen.lanegraph.query import node_id, walk_node_id
 from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.document.problems import validated
 from odscen.scenario.document.scenario_document import Scenario
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from odscen.base.arrays import IntArray
     from odscen.formats.base import ElementReport, ImportMap
     from odscen.formats.tracks.recorded_traffic import RecordedTraffic
+    from odscen.lanegraph.graphs import Segments
     from odscen.scenario.document.rules_document import TrajectoryRow
     from odscen.simulators.assets import Assets
 
@@ -94,38 +97,45 @@ def scenario_of_tracks(
             "with --window"
         )
     step = min(max(round(recorded.step, 3), _SHORTEST_STEP), _LONGEST_STEP)
-    placing = _Placing(the_map)
+    placing, graph = _Placing(the_map), the_map.sumo_map.graph
     names = _actor_names(users["id"].to_list())
     # Who appears does so one step later at the earliest; all are later by the same time.
     first = float(rows["time"].min())  # type: ignore[arg-type]
     later = step - first
-    actors, rules = [], []
+    placed: dict[str, _Placed] = {}
     for user, category in users.select("id", "category").iter_rows():
         own = rows.filter(pl.col("id") == user)
         if own.height < 2:
             report.add("ignored", f"road user {user}", "it has one row only")
             continue
-        made = placing.place_actor(own, Category(category))
-        if made is None:
+        place = placing.place_actor(own, Category(category))
+        if place is None:
             where = "walk" if category == Category.PEDESTRIAN else "lane"
             report.add("refused", f"road user {user}", f"no {where} within {_NEAR_LANE:g} m of it")
+        else:
+            placed[user] = _Placed(own, Category(category), place.segment, place.fields)
+    if not placed:
+        raise InputError("no road user of the window is near a lane or walk of the map")
+    region = _largest_piece(graph.segments, [found.segment for found in placed.values()])
+    actors, rules = [], []
+    for user, found in placed.items():
+        if found.segment not in region:
+            reason = "the map is in several pieces, and the others drive in another one"
+            report.add("refused", f"road user {user}", reason)
             continue
         is_ego = user == choice.ego
-        made |= {"id": names[user], "category": category, "ego": is_ego}
-        model = _model_of_size(own, Category(category), assets)
+        made = found.fields | {"id": names[user], "category": found.category, "ego": is_ego}
+        model = _model_of_size(found.own, found.category, assets)
         if model is not None:
             made["model"] = model
-        begin, track = trajectory_rows(own, of=user)
-        driven = is_ego or (choice.follow == "drive" and category != Category.PEDESTRIAN)
-        if driven:
-            made |= _driven(own, begin + later)
+        begin, track = trajectory_rows(found.own, of=user)
+        if is_ego or (choice.follow == "drive" and found.category != Category.PEDESTRIAN):
+            made |= _driven(found.own, begin + later)
         else:
             made["depart"] = round(begin + later, 6)
-            rules += _rules_of(names[user], track, begin + later - step, own, choice, names)
+            rules += _rules_of(names[user], track, begin + later - step, found.own, choice, names)
         actors.append(made)
         report.add("taken", f"road user {user}", f"actor {names[user]}")
-    if not actors:
-        raise InputError("no road user of the window is near a lane or walk of the map")
     last = float(rows["time"].max())  # type: ignore[arg-type]
     return validated(
         Scenario,
@@ -136,9 +146,9 @@ def scenario_of_tracks(
             "map": {
                 "name": the_map.name,
                 "sha256": the_map.sha256,
-                "spacing": the_map.sumo_map.graph.lanes.spacing,
+                "spacing": graph.lanes.spacing,
             },
-            "roi": list(the_map.sumo_map.graph.segments.ids),
+            "roi": [graph.segments.ids[row] for row in sorted(region)],
             "simulation": {
                 "duration": round(last + later + _TAIL, 3),
                 "step_length": step,
@@ -184,6 +194,32 @@ def _actor_names(users: list[str]) -> dict[str, str]:
     return names
 
 
+class _Place(NamedTuple):
+    """Segment on which an actor begins, and fields of the document that place it."""
+
+    segment: int
+    fields: dict[str, Any]
+
+
+class _Placed(NamedTuple):
+    own: pl.DataFrame
+    category: Category
+    segment: int
+    fields: dict[str, Any]
+
+
+def _largest_piece(segments: Segments, begins: Sequence[int]) -> set[int]:
+    """Rows of connected segments, of the pieces of the map that on which most road users begin."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    total, pairs = len(segments.ids), segments.adjacency.reshape(-1, 2)
+    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(total, total))
+    piece = connected_components(links, directed=False)[1]
+    most = np.bincount(piece[np.asarray(begins)]).argmax()
+    return set(np.flatnonzero(piece == most).tolist())
+
+
 class _Placing:
     """Where road users are placed on the lane graph, and where they go."""
 
@@ -204,12 +240,15 @@ class _Placing:
         self._router = Router(self._map, usable.drivable)
         self._finder = LaneFinder(self._map)
 
-    def place_actor(self, own: pl.DataFrame, category: Category) -> dict[str, Any] | None:
+    def place_actor(self, own: pl.DataFrame, category: Category) -> _Place | None:
         """Spawn, goal and what else places an actor; ``None`` if nothing is near."""
         first, last = (own.row(k, named=True) for k in (0, -1))
         if category == Category.PEDESTRIAN:
             spawn = self._near_walk(first)
-            return None if spawn is None else {"spawn": str(walk_node_id(self._map, spawn))}
+            if spawn is None:
+                return None
+            segment = int(self._map.walks.segment[spawn])
+            return _Place(segment, {"spawn": str(walk_node_id(self._map, spawn))})
         start = self._near_lane(self._starts, first)
         if start is None:
             return None
@@ -218,7 +257,7 @@ class _Placing:
         place = self._finder.locate(*(np.array([first[name]]) for name in ("x", "y", "hdg")))
         room = max(float(place.width[0]) - _body_width(own, category), 0.0) / 2.0
         made["lateral_offset"] = round(float(np.clip(place.lateral[0], -room, room)), 2)
-        return made
+        return _Place(int(self._map.lanes.segment[start]), made)
 
     def _route_along(self, start: int, last: dict[str, Any]) -> dict[str, Any]:
         """The end of the region that is nearest beyond the last place, by way of that."""
