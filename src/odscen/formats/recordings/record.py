@@ -141,7 +141,7 @@ def recording_of(source: ExportSource) -> RunRecording:
     if recorded is None or source.roads is None:
         raise InputError("this format says what happened in a run: name the folder of one")
     times = instants(
-        recorded, ExportWindow(*(_seconds_option(source.options, name) for name in WINDOW))
+        recorded, ExportWindow(*(seconds_option(source.options, name) for name in WINDOW))
     )
     elements = map_elements(source.roads, source.sumo_map.graph.lanes)
     return RunRecording(
@@ -158,7 +158,14 @@ def recording_of(source: ExportSource) -> RunRecording:
     )
 
 
-def _seconds_option(options: Mapping[str, str], name: str) -> float | None:
+def seconds_option(options: Mapping[str, str], name: str) -> float | None:
+    """Seconds of an option, ``None`` if it is not given.
+
+    Raises
+    ------
+    InputError
+        If it is no number.
+    """
     given = options.get(name)
     if given is None:
         return None
