@@ -76,6 +76,7 @@ READERS = {
     ),
     "arrays": Reader(".npz", (), of="pyg"),
     "scenarionet": Reader("", (("metadrive-simulator==0.4.3",),)),
+    "osi": Reader(".osi", (("omega-prime==0.3.7", "betterosi==0.9.0"),)),
 }  # fmt: skip
 
 
@@ -196,6 +197,10 @@ def _named(name: str, rows: list[list[Any]], notes: dict[str, Any], begin: float
         }
         for scenario, number, step, *pose in rows:
             yield (names[number], first[scenario] + step), pose
+    elif name == "osi":
+        names = {number: one for one, number in notes["ids"].items()}
+        for number, time, *pose in rows:
+            yield (names[number], round((time - begin) / STEP)), pose
     elif name == "commonroad":
         obstacles = {one["id"]: one for one in notes["obstacles"]}
         for number, step, *pose in rows:
@@ -220,7 +225,7 @@ def check(result: dict[str, Any]) -> list[str]:
     wrong = [f"{one} {result[one]}" for one in never if result.get(one)]
     if result["read_tracks"] != result["recorded_tracks"]:
         wrong.append(f"{result['read_tracks']} of {result['recorded_tracks']} tracks")
-    lanes = result.get("lanes", result.get("lanelets"))
+    lanes = result.get("lanes", result.get("lanelets", []))  # a trace has its map beside it
     for count in lanes if isinstance(lanes, list) else [lanes]:
         walks = result.get("crosswalks", 0)
         if count - walks != result["expected_lanes"]:

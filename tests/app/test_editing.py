@@ -120,6 +120,25 @@ def test_the_page_undoes_what_was_saved_in_python_and_the_other_way_round(
     assert [step.label for step in Editing(workspace, file).steps] == ["Change the seed"]
 
 
+def test_the_page_keeps_some_scenarios_in_memory_and_reads_the_others_again(
+    workspace: Workspace, empty: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("odscen.web.drafts.MOST_OPEN", 2)
+    drafts = Drafts(workspace)
+    for name in ("a", "b"):
+        drafts.create(empty, name, stem=name, label="New scenario")
+    drafts.change("a", 1, "Change", lambda old: old.model_copy(update={"seed": 7}))
+    kept = drafts.get("a").scenario
+    drafts.create(empty, "c", stem="c", label="New scenario")
+    assert drafts.get("a").scenario is kept  # b was looked at longest ago
+    for name in ("b", "c"):
+        drafts.get(name)
+    again = drafts.get("a")
+    assert again.scenario is not kept
+    assert (again.scenario, again.history.version, again.history.undo) == (kept, 2, "Change")
+    assert drafts.undo("a", 2).scenario == empty
+
+
 def test_what_the_page_has_changed_meanwhile_is_not_overwritten(
     workspace: Workspace, empty: Scenario
 ) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 import re
 import shutil
+import struct
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -25,12 +27,13 @@ from odscen.formats import list_formats
 from odscen.formats.base import RecordedRun
 from odscen.formats.recordings.tfrecord import read_tfrecord
 from odscen.formats.recordings.track_grid import ExportWindow, instants, tracks_of
+from odscen.formats.tracks.osi_trace import osi_fields, read_osi_trace
 from odscen.learning.hetero_data import read_arrays
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
 from odscen.runs.run_settings import RunSettings
 
-FORMATS = ("pyg", "scenarionet", "waymo", "commonroad")
+FORMATS = ("pyg", "scenarionet", "waymo", "commonroad", "osi")
 SECONDS = 9.6
 DOCUMENT = Path(__file__).parents[2] / "docs" / "learning-formats.md"
 States = dict[tuple[str, int], tuple[float, float, float]]
@@ -288,6 +291,59 @@ def test_lights_of_commonroad_show_each_instant_of_the_run(exports: Path) -> Non
         colors = [one.text for one in light.iterfind("cycle/cycleElement/color")]
         assert sum(durations) == instants
         assert all(one != other for one, other in pairwise(colors))
+
+
+# ---------------------------------------------------------------------------- OSI
+def test_the_osi_trace_has_every_recorded_state(exports: Path, run: Run, recorded: States) -> None:
+    said = json.loads(_file(exports, "osi/*.export.json").read_text())
+    names = {str(number): name for name, number in said["ids"].items()}
+    read = read_osi_trace(_file(exports, "osi/*.osi"), 0.0, math.inf).rows
+    found = {
+        (names[number], round(time * 10)): (x, y, hdg)
+        for number, time, x, y, hdg in read.select("id", "time", "x", "y", "hdg").iter_rows()
+    }
+    _same(found, recorded, within=1e-9)
+    plan = json.loads((run.folder / "plan.json").read_text())
+    users = {user["id"]: user for user in plan["actors"]}
+    for number, category, length, width in (
+        read.select("id", "category", "length", "width").unique().iter_rows()
+    ):
+        user = users[names[number]]
+        assert category == user["category"]
+        assert (length, width) == pytest.approx((user["length"], user["width"]), abs=1e-6)
+    assert (said["frames"], said["step"]) == (len({step for _, step in recorded}), 0.1)
+    assert _file(exports, "osi/*.xodr").name == f"{run.summary['map']}.xodr"
+
+
+def test_the_osi_trace_shows_one_bulb_of_each_light(exports: Path) -> None:
+    said = json.loads(_file(exports, "osi/*.export.json").read_text())
+    content = _file(exports, "osi/*.osi").read_bytes()
+    (size,) = struct.unpack_from("<I", content)
+    lights = [value for field, value in osi_fields(content[4 : 4 + size]) if field == 7]
+    classified = {}
+    for light in lights:
+        parts = dict(osi_fields(light))
+        color = dict(osi_fields(parts[3]))
+        classified[dict(osi_fields(parts[1]))[1]] = (color[1], color[3] == 3)
+    assert len(lights) == 3 * len(said["traffic_lights"]) > 0
+    for light in said["traffic_lights"]:
+        bulbs = [classified[bulb] for bulb in light["ids"]]
+        assert [kind for kind, _ in bulbs] == [2, 3, 4]  # red, yellow, green
+        assert sum(lit for _, lit in bulbs) == 1
+
+
+def test_a_long_run_is_no_single_osi_trace(
+    workspace: Workspace, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("odscen.formats.osi_format.MOST_STATES", 3)
+    with pytest.raises(InputError, match=r"choose a part of the run with --begin and --end"):
+        export_run(workspace, run.folder, tmp_path / "whole", to="osi")
+    assert not (tmp_path / "whole").exists()
+    part = {"begin": "0", "end": "0"}
+    monkeypatch.setattr("odscen.formats.osi_format.MOST_STATES", 200)
+    files = export_run(workspace, run.folder, tmp_path / "part", to="osi", options=part)
+    trace = next(file for file in files if file.suffix == ".osi")
+    assert read_osi_trace(trace, 0.0, math.inf).rows["time"].unique().to_list() == [0.0]
 
 
 # ---------------------------------------------------------------------------- all of them

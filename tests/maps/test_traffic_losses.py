@@ -28,15 +28,27 @@ def test_losses_and_guesses_are_counted_by_kind() -> None:
             entry("repaired", "road 5", "5 m against 9 m; 9 m holds [road-length]"),
             entry("repaired", "road 6 > lane 1", "it leads to lane 1, which alone states the link"),
             entry("repaired", "road 6", "a mark is left out [paint]"),
+            entry(
+                "lost",
+                "road 7",
+                "lanes of type restricted, on which no access allows vehicles: left out",
+            ),
+            entry("lost", "road 8 > lane 1", "access: deny xyz has no vehicle class in SUMO"),
             entry("kept", "map", "12 connections between lanes"),
             entry("guessed", "map", "2 traffic lights have programs of odscen's own"),
         ]
     }
     losses = traffic_losses(report)
-    assert losses.lost == {"lanes_both_ways": 1, "roads": 1, "signals": 2, "unknown_signs": 3}
+    assert losses.lost == {
+        "access_rules": 1,
+        "lanes_both_ways": 1,
+        "roads": 1,
+        "signals": 2,
+        "unknown_signs": 3,
+    }
     assert losses.guessed == {"connections": 1, "road_lengths": 1, "signals": 1}
     assert str(losses) == (
-        "; lost for traffic: 1 lane open both ways, 1 road, 2 lights and signs, "
+        "; lost for traffic: 1 access rule, 1 lane open both ways, 1 road, 2 lights and signs, "
         "3 signs not understood"
         "; guessed: 1 connection, 1 length of a road, 1 light or sign"
     )

@@ -9,7 +9,7 @@ import pytest
 from odscen.base.ids import LaneKey
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
-from odscen.opendrive.topology import lane_successors
+from odscen.opendrive.topology import cut_off_lanes, lane_successors
 from tests.conftest import shared_map_files
 from tests.opendrive.snippets import document, lane, road, section
 
@@ -88,6 +88,34 @@ def test_connections_lead_into_a_junction_and_road_links_out_of_it() -> None:
     )
     found = successors(one, two, inner, junction)
     assert (found["1.0.-1"], found["3.0.-1"]) == (["3.0.-1"], ["2.0.-1"])
+
+
+@pytest.mark.parametrize(
+    ("kinds", "cut_off"),
+    [
+        (("restricted", "driving"), ["3.0.-1"]),
+        (("driving", "sidewalk"), ["3.0.-1"]),
+        (("driving", "driving"), []),
+        (("biking", "driving"), ["3.0.-1"]),
+    ],
+)
+def test_a_connecting_lane_from_or_to_a_path_is_cut_off(
+    kinds: tuple[str, str], cut_off: list[str]
+) -> None:
+    one = road("1", link=to_junction("successor", "9"), lanes=section(lane(-1, kind=kinds[0])))
+    two = road("2", link=to_junction("predecessor", "9"), lanes=section(lane(-1, kind=kinds[1])))
+    inner = road(
+        "3",
+        junction="9",
+        link=to_road("predecessor", "1", "end") + to_road("successor", "2", "start"),
+        lanes=section(lane(-1, inside=link(-1, -1))),
+    )
+    junction = (
+        '<junction id="9"><connection id="0" incomingRoad="1" connectingRoad="3" '
+        'contactPoint="start"><laneLink from="-1" to="-1"/></connection></junction>'
+    )
+    odr = parse(document(one, two, inner, junction))
+    assert [str(key) for key in cut_off_lanes(odr)] == cut_off
 
 
 def test_a_direct_junction_joins_roads_without_a_road_between() -> None:

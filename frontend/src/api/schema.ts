@@ -70,6 +70,25 @@ export interface paths {
          */
         get: operations["report_api_maps__name__report_get"];
     };
+    "/api/maps/{name}/place": {
+        /**
+         * Show Place
+         * @description What is at a place, metres: the lane there, and what can be removed.
+         */
+        get: operations["show_place_api_maps__name__place_get"];
+    };
+    "/api/maps/{name}/edits": {
+        /**
+         * Show Edits
+         * @description Edits that mend a map, and what became of each.
+         */
+        get: operations["show_edits_api_maps__name__edits_get"];
+        /**
+         * Mend Map
+         * @description Mend a map by edits, in place of those that it has; it is built anew in the background.
+         */
+        post: operations["mend_map_api_maps__name__edits_post"];
+    };
     "/api/map-importers": {
         /**
          * List Map Importers
@@ -774,8 +793,10 @@ export interface components {
          *     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-         *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+         *     positive to the left of the driving direction, ``longitudinal_offset`` in it: metres from the
+         *     node to the centre of the body. ``size`` is that of its body; ``None`` is that of its model, or
+         *     the usual one of its category. ``style`` is a driving style or the id of a driver set of the
+         *     scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
          *     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
          *     their order; an open goal is one that can be reached from the last of them. ``driver`` is who
          *     drives a vehicle that no rule moves: SUMO, or the ``story`` alone, which keeps its initial speed
@@ -792,6 +813,9 @@ export interface components {
             speed: number | null;
             /** @default 0 */
             lateral_offset: number;
+            /** @default 0 */
+            longitudinal_offset: number;
+            size: components["schemas"]["BodySize-Output"] | null;
             /** @default 0 */
             depart: number;
             initial_speed: number | null;
@@ -839,6 +863,8 @@ export interface components {
             via?: string[];
             speed?: number | null;
             lateral_offset?: number;
+            longitudinal_offset?: number;
+            size?: components["schemas"]["BodySize-Input"] | null;
             depart?: number;
             initial_speed?: number | null;
             style?: string;
@@ -873,6 +899,45 @@ export interface components {
             speed?: number | null;
             initial_speed?: number | null;
             profile?: string | null;
+        };
+        /** @description Put a traffic island on the place; it is drawn, and does not part a crosswalk. */
+        AddIsland: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "add_island";
+            /** @default 6 */
+            length?: number;
+            /** @default 2 */
+            width?: number;
+        };
+        /** @description Put up a traffic light for the driving lanes of the direction there, with a controller. */
+        AddLight: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "add_light";
+        };
+        /** @description Put up a sign for the driving lanes of the direction there; ``value`` in ``unit``. */
+        AddSign: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "add_sign";
+            type: string;
+            /** @default -1 */
+            subtype?: string;
+            /** @default DE */
+            country?: string;
+            value?: number | null;
+            /** @default  */
+            unit?: string;
         };
         /** @description Put a stage in, behind the stage ``after`` or at the end. */
         AddStageEdit: {
@@ -1037,6 +1102,18 @@ export interface components {
             width: number;
             height: number;
         };
+        /** @description Bounding box of a road user, metres; without a height it has that of its category. */
+        "BodySize-Input": {
+            length: number;
+            width: number;
+            height?: number | null;
+        };
+        /** @description Bounding box of a road user, metres; without a height it has that of its category. */
+        "BodySize-Output": {
+            length: number;
+            width: number;
+            height: number | null;
+        };
         Body_add_map_api_maps_post: {
             /** @description A map of any format of `/map-importers`. */
             file: string;
@@ -1133,6 +1210,8 @@ export interface components {
             via?: string[];
             speed?: number | null;
             lateral_offset?: number;
+            longitudinal_offset?: number;
+            size?: components["schemas"]["BodySize-Input"] | null;
             depart?: number;
             initial_speed?: number | null;
             style?: string;
@@ -1255,8 +1334,8 @@ export interface components {
          */
         "Condition-Input": {
             time?: components["schemas"]["AfterTime"] | null;
-            ttc?: components["schemas"]["PairBounded-Input"] | null;
-            headway?: components["schemas"]["PairBounded-Input"] | null;
+            ttc?: components["schemas"]["SecondsBetween-Input"] | null;
+            headway?: components["schemas"]["SecondsBetween-Input"] | null;
             distance?: components["schemas"]["DistanceBounded-Input"] | null;
             relative_speed?: components["schemas"]["PairBounded-Input"] | null;
             speed?: components["schemas"]["OwnBounded-Input"] | null;
@@ -1289,8 +1368,8 @@ export interface components {
          */
         "Condition-Output": {
             time: components["schemas"]["AfterTime"] | null;
-            ttc: components["schemas"]["PairBounded-Output"] | null;
-            headway: components["schemas"]["PairBounded-Output"] | null;
+            ttc: components["schemas"]["SecondsBetween-Output"] | null;
+            headway: components["schemas"]["SecondsBetween-Output"] | null;
             distance: components["schemas"]["DistanceBounded-Output"] | null;
             relative_speed: components["schemas"]["PairBounded-Output"] | null;
             speed: components["schemas"]["OwnBounded-Output"] | null;
@@ -1438,6 +1517,17 @@ export interface components {
             unit: string;
             passed: boolean;
             time: number | null;
+        };
+        /** @description Add a crosswalk over the carriageway, ``width`` metres along the road, or remove it. */
+        CrosswalkEdit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "add_crosswalk" | "remove_crosswalk";
+            /** @default 4 */
+            width?: number;
         };
         /** @description A crosswalk: its outline, and the line along which people walk; metres. */
         CrosswalkInfo: {
@@ -2369,6 +2459,20 @@ export interface components {
             plans: components["schemas"]["DayPlan-Output"][];
             bus_priority: boolean | null;
         };
+        /** @description Say what a lane is for (``type`` of OpenDRIVE), and who alone may or who may not use it. */
+        LaneAccess: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "access";
+            type?: string | null;
+            /** @default [] */
+            allow?: string[];
+            /** @default [] */
+            deny?: string[];
+        };
         /**
          * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
          *
@@ -2438,6 +2542,16 @@ export interface components {
             s: number;
             /** @default 5 */
             length: number;
+        };
+        /** @description Give a lane a width, metres, but for a taper at both ends of its section. */
+        LaneWidth: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "lane_width";
+            width: number;
         };
         /** @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds. */
         "LateralMove-Input": {
@@ -2531,6 +2645,16 @@ export interface components {
             semantics: components["schemas"]["SemanticsInfo"];
             lights: components["schemas"]["LightInfo"][];
         };
+        /** @description All edits of a map, in place of those that it has; ``out`` is the map that gets them. */
+        MapEdits: {
+            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["odscen__maps__map_edits__SpeedLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
+            out?: string | null;
+        };
+        /** @description Edits of a map in their order, and what became of each; the row of edit n has number n. */
+        MapEditsInfo: {
+            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["odscen__maps__map_edits__SpeedLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
+            rows: components["schemas"]["ConversionEntry"][];
+        };
         /** @description The map's version of OpenDRIVE, and on which side is driven: RHT, LHT or mixed. */
         MapHeader: {
             version: string;
@@ -2568,6 +2692,25 @@ export interface components {
             };
             preview: string;
             outdated: boolean;
+        };
+        /**
+         * @description A place on the ground.
+         *
+         *     Attributes
+         *     ----------
+         *     x, y
+         *         Metres in the OpenDRIVE frame.
+         *     lat, lon
+         *         Degrees; of a map with a georeference they hold, and are added to places that have none.
+         *     hdg
+         *         Direction of driving there, rad counter-clockwise from x, where lanes lie on each other.
+         */
+        MapPlace: {
+            x?: number | null;
+            y?: number | null;
+            lat?: number | null;
+            lon?: number | null;
+            hdg?: number | null;
         };
         /** @description The map, by name *and* content, and the spacing of the graph that node names refer to. */
         MapReference: {
@@ -2947,6 +3090,23 @@ export interface components {
         PictureKey: {
             picture: string;
             words: string;
+        };
+        /**
+         * @description What is at a place of a map: its lane, with outline, and what is near it.
+         *
+         *     Width in metres, limit in km/h, direction of driving in rad.
+         */
+        PlaceInfo: {
+            road: string;
+            type: string;
+            width: number;
+            limit: number | null;
+            hdg: number;
+            ring: [
+                number,
+                number
+            ][];
+            parts: ("stop_line" | "crosswalk" | "light" | "sign")[];
         };
         /**
          * @description Planned motion: rows ``first[i]`` up to ``first[i + 1]`` belong to ``users[i]``.
@@ -3351,6 +3511,18 @@ export interface components {
              */
             destinations: "leave" | "end" | "wait";
         };
+        /** @description Paint the border that is nearest to the place: ``solid``, ``broken``, ``none``, ... */
+        RoadMarkEdit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "road_mark";
+            /** @enum {string} */
+            mark: "none" | "solid" | "broken" | "solid solid" | "solid broken" | "broken solid" | "broken broken" | "curb";
+            lane_change?: ("both" | "increase" | "decrease" | "none") | null;
+        };
         /**
          * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
          *
@@ -3437,11 +3609,14 @@ export interface components {
         /**
          * @description ``digest`` is the same where scenarios differ at most in name and description.
          *
-         *     ``counts`` is how many counts of vehicles the scenario has.
+         *     ``counts`` is how many counts of vehicles the scenario has, ``clock`` the time of day at the
+         *     start, seconds, 0 without one.
          */
         RunContent: {
             digest: string;
             counts: number;
+            /** @default 0 */
+            clock: number;
         };
         /**
          * @description Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
@@ -3511,7 +3686,8 @@ export interface components {
          *     ``finished`` is when its results were written, in seconds since 1970. ``preparing`` says how far
          *     routes by travel time have been found before it begins. ``carla`` says that it is
          *     shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
-         *     ``slices``; one that is ``interrupted`` can go on from the last of them.
+         *     ``slices``; one that is ``interrupted`` can go on from the last of them. ``clock`` is the time
+         *     of day at the start, seconds, while the server still has the scenario (see ``RunContent``).
          */
         RunInfo: {
             run: string;
@@ -3528,6 +3704,7 @@ export interface components {
             carla: boolean;
             slices: components["schemas"]["RunSlices"] | null;
             preparing: string | null;
+            clock: number | null;
         };
         /**
          * @description What vehicles did on each lane in each interval of a run.
@@ -3730,7 +3907,7 @@ export interface components {
              */
             signals: components["schemas"]["Signals"];
             /** @default [] */
-            measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
+            measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["odscen__scenario__document__measures_document__SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
             /**
              * @default {
              *       "duration": 600,
@@ -3803,6 +3980,36 @@ export interface components {
             label: string;
             undo: string | null;
             redo: string | null;
+        };
+        /**
+         * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
+         *
+         *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         */
+        "SecondsBetween-Input": {
+            below?: number | null;
+            above?: number | null;
+            of?: string | null;
+            to: string;
+            /** @default true */
+            free?: boolean;
+            /** @default false */
+            ahead?: boolean;
+        };
+        /**
+         * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
+         *
+         *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         */
+        "SecondsBetween-Output": {
+            below: number | null;
+            above: number | null;
+            of: string | null;
+            to: string;
+            /** @default true */
+            free: boolean;
+            /** @default false */
+            ahead: boolean;
         };
         /** @description A segment and its neighbours, which are rows. */
         SegmentInfo: {
@@ -4120,7 +4327,7 @@ export interface components {
              * @enum {string}
              */
             kind: "set_measure";
-            measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
+            measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["odscen__scenario__document__measures_document__SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
             instead_of?: string | null;
         };
         /** @description Let the program of a light begin so many seconds into the scenario. */
@@ -4421,6 +4628,17 @@ export interface components {
             /** @default 3 */
             gap: number;
         };
+        /** @description Remove the light or sign nearest to the place, or move it ``by`` metres along its road. */
+        SignalEdit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "move_light" | "move_sign" | "remove_light" | "remove_sign";
+            /** @default 0 */
+            by?: number;
+        };
         /**
          * @description A light or sign; metres, ``value`` of a speed limit in m/s.
          *
@@ -4615,34 +4833,6 @@ export interface components {
             over: number | null;
             within: number | null;
         };
-        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
-        "SpeedLimit-Input": {
-            id: string;
-            /** @default 0 */
-            begin?: number;
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            places: string[];
-            speed: number;
-        };
-        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
-        "SpeedLimit-Output": {
-            id: string;
-            /** @default 0 */
-            begin: number;
-            end: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            places: string[];
-            speed: number;
-        };
         /**
          * @description A stage in the cycle of a plan; seconds.
          *
@@ -4674,6 +4864,21 @@ export interface components {
             of: string | null;
             /** @default 0 */
             seconds: number;
+        };
+        /**
+         * @description Add a stop line for the lanes of the direction there, remove the nearest or move it.
+         *
+         *     ``by`` is metres in the direction of driving.
+         */
+        StopLineEdit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "add_stop_line" | "move_stop_line" | "remove_stop_line";
+            /** @default 0 */
+            by?: number;
         };
         /** @description A stop line from end to end. */
         StopLineInfo: {
@@ -5050,6 +5255,16 @@ export interface components {
             /** @default 300 */
             within: number;
         };
+        /** @description Let a lane lead to the lane at ``to`` through the junction between them, or not any more. */
+        TurnEdit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "add_turn" | "remove_turn";
+            to: components["schemas"]["MapPlace"];
+        };
         /**
          * @description A turn across oncoming traffic, and how it is treated in the first plan.
          *
@@ -5308,6 +5523,49 @@ export interface components {
             id: string;
             segments: string[];
         };
+        /** @description Give the lane, its direction or all lanes of the section there a limit, km/h. */
+        odscen__maps__map_edits__SpeedLimit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            limit: number;
+            /**
+             * @default direction
+             * @enum {string}
+             */
+            lanes?: "lane" | "direction" | "road";
+        };
+        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
+        "odscen__scenario__document__measures_document__SpeedLimit-Input": {
+            id: string;
+            /** @default 0 */
+            begin?: number;
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            places: string[];
+            speed: number;
+        };
+        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
+        "odscen__scenario__document__measures_document__SpeedLimit-Output": {
+            id: string;
+            /** @default 0 */
+            begin: number;
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            places: string[];
+            speed: number;
+        };
         /** @description A road user that will ever be in a frame, and the row by which frames name them; metres. */
         LiveActor: {
             index: number;
@@ -5556,6 +5814,63 @@ export interface operations {
             200: {
                 content: {
                     "application/json": components["schemas"]["ConversionInfo"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    show_place_api_maps__name__place_get: {
+        parameters: {
+            query: {
+                x: number;
+                y: number;
+            };
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["PlaceInfo"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    show_edits_api_maps__name__edits_get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["MapEditsInfo"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    mend_map_api_maps__name__edits_post: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MapEdits"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                content: {
+                    "application/json": components["schemas"]["JobStarted"];
                 };
             };
             default: components["responses"]["Error"];

@@ -7,6 +7,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from odscen.lanegraph.parking_areas import map_parking
+from odscen.maps.edited_map import EditedMap
+from odscen.opendrive.parse import parse
 from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.realize.usable import usable_places
@@ -58,6 +60,12 @@ def load_map(entry: MapEntry) -> LoadedMap:
     sumo = SumoMap.of(graph, entry.lane_table(), parking=parking)
     lights = scenario_lights(sumo)
     return LoadedMap(entry, sumo, usable_places(sumo), drawing, lights)
+
+
+@lru_cache(maxsize=2)
+def map_to_mend(entry: MapEntry) -> EditedMap:
+    """Load a map to look at what edits would find on it; the last two stay in memory."""
+    return EditedMap(parse(entry.read("xodr"), file=entry.name))
 
 
 def map_of(workspace: Workspace, scenario: Scenario) -> LoadedMap:

@@ -307,6 +307,46 @@ def export(
 
 
 @app.command()
+def patch(
+    name: Annotated[str, typer.Argument(metavar="MAP")],
+    edits: Annotated[
+        Path, typer.Option(help="Edits, JSON or TOML: see docs/mending.md.", metavar="FILE")
+    ],
+    out: Annotated[
+        str | None,
+        typer.Option(help="Name of the mended map. (default: MAP is replaced)", metavar="NEW"),
+    ] = None,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="In place of the edits that MAP has.")
+    ] = False,
+    memory: BuildMemoryOption = None,
+    minutes: BuildMinutesOption = None,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Mend a map by a file of edits: widths, limits, turns, crosswalks, lights, signs, ...
+
+    The exit code is 1 if an edit does not fit the map any more; the others are done all the same.
+    """
+    from odscen.maps.allowances import BuildLimits
+    from odscen.maps.store import Workspace
+
+    store = Workspace.open(workspace)
+    limits = BuildLimits(memory, minutes)
+    with progress(out or name) as step:
+        entry = store.mend_map(name, edits, out=out, anew=anew, limits=limits, progress=step)
+    rows = entry.edit_rows()
+    for row in rows:
+        log(f"{row['source_id']}: {row['fate']}: {row['element']}: {row['reason']}")
+    if missed := entry.info["fidelity"]["not_held"]:
+        log(_warn_of_network(entry.name, missed))
+    if as_json:
+        file = str(entry.path("xodr"))
+        print_json({**_map_row(entry), "file": file, "edits": rows})
+    raise typer.Exit(1 if any(row["fate"] == "lost" for row in rows) else 0)
+
+
+@app.command()
 def verify(
     name: Annotated[str, typer.Argument(metavar="NAME")],
     drawing: Annotated[

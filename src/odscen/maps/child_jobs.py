@@ -33,6 +33,7 @@ def _build_map_job(
     source: str,
     importer: str | None,
     options: Mapping[str, Any],
+    edits: str | None,
     times_usual: float,
     progress: Progress,
 ) -> Mapping[str, Any]:
@@ -40,7 +41,7 @@ def _build_map_job(
     place = Path(folder)
     xodr = place / XODR_FILE
     content = xodr.read_bytes()
-    wish = ImportSettings(importer, options)
+    wish = ImportSettings(importer, options, edits)
     opendrive, imported = import_map(content, file, wish, progress=progress)
     if imported is not None:
         xodr.rename(place / imported.original)

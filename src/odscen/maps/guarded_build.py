@@ -70,6 +70,7 @@ def build_in_child(
                 "source": given.source if given else "",
                 "importer": importing.importer,
                 "options": dict(importing.options),
+                "edits": importing.edits,
                 "times_usual": allowance.times_usual,
             },
             folders=(scratch, folder),

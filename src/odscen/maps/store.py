@@ -7,17 +7,18 @@ before they become paths.
 
 from __future__ import annotations
 
+import logging
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from odscen.base.atomic_folders import clear_leftovers, new_folder
 from odscen.base.checksums import digest, sums_of, write_sums
 from odscen.base.errors import DamagedError, InputError, NotFoundError, OdscenError, in_file
 from odscen.base.folder_locks import locked
-from odscen.base.given_files import as_path, read_given
+from odscen.base.given_files import as_path, read_given, read_given_text
 from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
@@ -68,7 +69,7 @@ def is_outdated(entry: MapEntry) -> bool:
     return importer is not None and importer.version != entry.info["import"]["version"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False)
 class Workspace:
     """A folder with ``maps/``, ``scenarios/`` and ``runs/``, and more as needed.
 
@@ -85,6 +86,9 @@ class Workspace:
     """
 
     root: Path
+
+    def __init__(self, root: GivenPath) -> None:
+        object.__setattr__(self, "root", as_path(root))
 
     @classmethod
     def open(cls, root: GivenPath | None = None) -> Workspace:
@@ -340,6 +344,8 @@ class Workspace:
         with _workspace_errors(self.root), self._lock_map(name):
             built = _read_whole_map(final)
             same = built if built and built.source_sha256 == digest(content) else None
+            if built:
+                importing = importing.with_edits_of(built.importing)
             if network is not None:
                 return self._build_and_store(
                     name,
@@ -363,6 +369,66 @@ class Workspace:
             return self._build_and_store(
                 name, content, file, settings, importing, given, limits, progress
             )
+
+    def mend_map(
+        self,
+        name: str,
+        edits: GivenPath | Sequence[Mapping[str, Any]],
+        *,
+        out: str | None = None,
+        anew: bool = False,
+        limits: BuildLimits = BY_SIZE,
+        progress: ProgressCallback | None = None,
+    ) -> MapEntry:
+        """Mend a map by edits, which follow those that it has; it is built anew.
+
+        The edits are kept with the map: added from another file under the same name it has them
+        again. The import report says of each what it did, or why it does not fit the map.
+
+        Parameters
+        ----------
+        name
+            Of the map.
+        edits
+            A file, JSON or TOML, or the edits as JSON has them; see ``docs/mending.md``.
+        out
+            Name of the mended map; the map itself is replaced if not given.
+        anew
+            Whether these edits take the place of those that the map has.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        InputError
+            If an edit is wrong; names the edit, the field and the value.
+        LimitError
+            If it needs more memory or time than it may have.
+        WorkspaceError
+            If the workspace cannot be written.
+        """
+        from odscen.maps.map_edits import check_edits, edits_text, read_edits
+
+        entry = self.map(name)
+        if isinstance(edits, str | os.PathLike):
+            file = as_path(edits)
+            with in_file(file.name):
+                added = read_edits(read_given_text(file))
+        else:
+            added = check_edits(list(edits))
+        before = read_edits(entry.importing.edits or "[]") if not anew else []
+        return self.add_map_content(
+            entry.read(entry.source_key),
+            file=str(entry.info["source"]),
+            name=name if out is None else out,
+            settings=entry.conversion,
+            importing=replace(
+                entry.importing,
+                edits=edits_text([*before, *added]) if before or added else "",
+            ),
+            limits=limits,
+            progress=progress,
+        )
 
     def set_network(
         self,
@@ -439,6 +505,7 @@ class Workspace:
             )
             write_sums(folder, sums_of(folder, known={source: digest(content)}))
             info = read_entry(folder).info
+        logging.getLogger("odscen").info("map %s: built in %s", name, final)
         return MapEntry(name, final, info)
 
 

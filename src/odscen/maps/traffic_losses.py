@@ -26,7 +26,8 @@ _LOST: tuple[tuple[LossKind, str], ...] = (
     ("connections", "connecting lane "),
     ("connections", "no vehicle class may use"),
     ("lanes_both_ways", "open both ways"),
-    ("access_rules", "access"),
+    ("access_rules", "access: "),
+    ("access_rules", "access of "),
     ("crosswalks", "crosswalk"),
 )
 _GUESSED: tuple[tuple[LossKind, str], ...] = (
@@ -70,6 +71,8 @@ def traffic_losses(report: Mapping[str, Any]) -> TrafficLosses:
     guessed: Counter[LossKind] = Counter()
     for row in report.get("entries", ()):
         fate, element, reason = row["fate"], str(row["element"]), str(row["reason"])
+        if element.startswith("edit "):  # an edit that does not fit the map: nothing was lost
+            continue
         if fate == "lost" and element.startswith("signals of type"):
             lost["unknown_signs"] += int(reason.partition(" ")[0])
         elif fate in ("lost", "guessed") and "> signal" in element:

@@ -75,15 +75,21 @@ def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
     """
     with in_file(file) if file else nullcontext():
         notes = Notes()
-        started = _without_leading_space(text)
-        if len(started) != len(text):
-            detail = f"{len(text) - len(started)} characters before <?xml are skipped"
-            notes.add(Rule.LEADING_SPACE, "map", detail)
-        decoded = _decode_as_meant(started, notes)
-        root = load(decoded, max_bytes=MAX_BYTES, max_tags=MAX_TAGS)
-        if may_have_controls(text):
-            _space_controls(root, notes)
+        root = read_tree(text, notes)
         return _parse_root(root, notes)
+
+
+def read_tree(text: str | bytes, notes: Notes) -> Element:
+    """Root element of an OpenDRIVE file, without comments, as :func:`parse` reads it."""
+    started = _without_leading_space(text)
+    if len(started) != len(text):
+        detail = f"{len(text) - len(started)} characters before <?xml are skipped"
+        notes.add(Rule.LEADING_SPACE, "map", detail)
+    decoded = _decode_as_meant(started, notes)
+    root = load(decoded, max_bytes=MAX_BYTES, max_tags=MAX_TAGS)
+    if may_have_controls(text):
+        _space_controls(root, notes)
+    return root
 
 
 def _without_leading_space(text: str | bytes) -> str | bytes:

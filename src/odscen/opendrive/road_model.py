@@ -353,6 +353,9 @@ DRIVABLE_TYPES = frozenset(
 WALKABLE_TYPES = frozenset({"sidewalk", "walking"})
 """Lane types on which pedestrians are placed and routed; ``walking`` is 1.8's name."""
 
+CLOSED_TYPES = WALKABLE_TYPES | {"restricted", "biking"}
+"""Lane types that are no motor vehicle's, unless the lane's access says so."""
+
 _USES_BY_ACCESS: tuple[tuple[str, frozenset[str]], ...] = (
     ("biking", frozenset({"bicycle", "pedestrian"})),
     ("walking", frozenset({"pedestrian"})),

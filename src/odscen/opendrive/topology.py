@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from odscen.base.ids import LaneKey, RoadId
 from odscen.opendrive.lanes import is_forward
-from odscen.opendrive.road_model import DRIVABLE_TYPES
+from odscen.opendrive.road_model import CLOSED_TYPES, DRIVABLE_TYPES, lane_use
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
     from odscen.opendrive.road_model import (
         Connection,
@@ -228,6 +228,30 @@ def dead_ends(odr: OpenDrive) -> tuple[DeadEnd, ...]:
             if at_end and not joined and (key, not leads) not in beside:
                 found.append(DeadEnd(key, end, leads))
     return tuple(found)
+
+
+def cut_off_lanes(odr: OpenDrive) -> frozenset[LaneKey]:
+    """Connecting lanes for driving that only lanes closed to motor vehicles lead to, or follow.
+
+    Converters write them where a footpath or cycle path meets a road: no car can come over them.
+    """
+    successors = lane_successors(odr)
+    before: dict[LaneKey, list[LaneKey]] = {key: [] for key in successors}
+    for here, following in successors.items():
+        for there in following:
+            before[there].append(here)
+
+    def all_closed(neighbours: Collection[LaneKey]) -> bool:
+        lanes = [odr.roads[key.road].sections[key.section].lanes[key.lane] for key in neighbours]
+        return bool(lanes) and all(lane_use(lane) in CLOSED_TYPES for lane in lanes)
+
+    return frozenset(
+        key
+        for key, following in successors.items()
+        if odr.roads[key.road].junction is not None
+        and lane_use(odr.roads[key.road].sections[key.section].lanes[key.lane]) in DRIVABLE_TYPES
+        and (all_closed(before[key]) or all_closed(following))
+    )
 
 
 class SideLink(NamedTuple):

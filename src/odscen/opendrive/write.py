@@ -8,18 +8,20 @@ version in the header, 1.4 to 1.8, and reads back as the same model.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from lxml import etree
 
+from odscen.base.errors import OpenDriveError
 from odscen.base.markup import number
-from odscen.opendrive.road_model import GeometryKind
+from odscen.opendrive.parse import read_tree
+from odscen.opendrive.parse_rules import Notes
+from odscen.opendrive.road_model import Controller, GeometryKind, Road
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from odscen.opendrive.road_model import (
-        Controller,
         Cubic,
         Geometry,
         Header,
@@ -28,7 +30,6 @@ if TYPE_CHECKING:
         LaneSection,
         OpenDrive,
         Outline,
-        Road,
         RoadLink,
         RoadObject,
         Signal,
@@ -71,6 +72,95 @@ def write_opendrive(model: OpenDrive, *, vendor: str = "odscen", date: str = "")
     for junction in model.junctions.values():
         _write_junction(root, junction)
     return etree.tostring(root, encoding="UTF-8", xml_declaration=True, pretty_print=True)
+
+
+def rewrite_opendrive(text: bytes, before: OpenDrive, after: OpenDrive) -> bytes:
+    """Text of a map that was changed: what is as it was stays as the file has it.
+
+    Parameters
+    ----------
+    text, before
+        The file, and the map that :func:`~odscen.opendrive.parse.parse` has made of it.
+    after
+        The map with roads, junctions and controllers that were replaced, added or removed.
+
+    Returns
+    -------
+    bytes
+        UTF-8. Of roads that were replaced the objects, signals and ``userData`` that are as they
+        were stay as well; other children that the road model does not have are lost.
+
+    Raises
+    ------
+    OpenDriveError
+        If the file has an element that was replaced twice.
+    """
+    root = read_tree(text, Notes())
+    kinds: tuple[tuple[str, Mapping[Any, Any], Mapping[Any, Any]], ...] = (
+        ("road", before.roads, after.roads),
+        ("controller", before.controllers, after.controllers),
+        ("junction", before.junctions, after.junctions),
+    )
+    for tag, old, new in kinds:
+        elements: dict[str, list[Element]] = {}
+        for element in root.findall(tag):
+            elements.setdefault(element.get("id", ""), []).append(element)
+        for key in old:
+            if old[key] == new.get(key):
+                continue
+            places = elements.get(key, [])
+            if len(places) != 1:
+                raise OpenDriveError(
+                    f"it is there {len(places)} times, so it cannot be changed",
+                    element=f"{tag} {key}",
+                )
+            if key not in new:
+                root.remove(places[0])
+                continue
+            holder = etree.Element("holder")
+            _write_changed(holder, new[key], after.header.rev_minor)
+            written = holder[0]
+            _keep_unchanged(places[0], written, old[key], new[key])
+            root.replace(places[0], written)
+        added = [key for key in new if key not in old]
+        last = [element for element in root if element.tag == tag]
+        place = root.index(last[-1]) + 1 if last else len(root)
+        for number_, key in enumerate(added):
+            holder = etree.Element("holder")
+            _write_changed(holder, new[key], after.header.rev_minor)
+            root.insert(place + number_, holder[0])
+    etree.indent(root, space="  ")
+    return etree.tostring(root, encoding="UTF-8", xml_declaration=True, pretty_print=True)
+
+
+def _write_changed(parent: Element, value: Road | Controller | Junction, rev_minor: int) -> None:
+    if isinstance(value, Road):
+        _write_road(parent, value, rev_minor)
+    elif isinstance(value, Controller):
+        _write_controller(parent, value)
+    else:
+        _write_junction(parent, value)
+
+
+def _keep_unchanged(source: Element, written: Element, old: object, new: object) -> None:
+    """Put elements of the file in the place of those that were written of the same values."""
+    for data in source.findall("userData"):
+        written.append(data)
+    if not (isinstance(old, Road) and isinstance(new, Road)):
+        return
+    for tag, olds, news in (
+        ("object", old.objects, new.objects),
+        ("signal", old.signals, new.signals),
+    ):
+        same = {item.id: item for item in olds}
+        originals = {element.get("id", ""): element for element in source.iter(tag)}
+        for element in list(written.iter(tag)):
+            key = element.get("id", "")
+            item = next(item for item in news if item.id == key)
+            if same.get(key) == item and key in originals:
+                parent = element.getparent()
+                if parent is not None:
+                    parent.replace(element, originals[key])
 
 
 def _append_element(parent: Element, tag: str, **attributes: str | float | None) -> Element:

@@ -39,6 +39,9 @@ if TYPE_CHECKING:
 
 _PATIENCE = 30.0
 """Wall seconds that a new scenario waits for another one, of another process, to be written."""
+MOST_OPEN = 32
+"""Scenarios that are kept in memory; others are read again when they are asked for."""
+
 _FileState = tuple[int, int, int]
 
 
@@ -111,10 +114,9 @@ class Drafts:
             known = self._open.get(name)
             sha256 = document_sha256(text)
             if known is not None and known.history.sha256 == sha256:
-                return known
+                return self._keep_open(known)
             scenario = loads(text, file=f"{name}{SUFFIX}")
-            self._open[name] = Draft(name, scenario, self._history_of(name).open(text))
-            return self._open[name]
+            return self._keep_open(Draft(name, scenario, self._history_of(name).open(text)))
 
     def create(self, scenario: Scenario, name: str | None, *, stem: str, label: str) -> Draft:
         """Save a new scenario; a free name is made from ``stem`` if none is given.
@@ -131,8 +133,7 @@ class Drafts:
             self._refuse_taken(name)
             begun = self._history_of(name).begin(text, label=label)
             write_text(self._path_of(name), text)
-            self._open[name] = Draft(name, scenario, begun)
-            return self._open[name]
+            return self._keep_open(Draft(name, scenario, begun))
 
     def change(
         self,
@@ -183,8 +184,7 @@ class Drafts:
                 self._history_of(name).folder.rename(self._history_of(new).folder)
             self._path_of(name).rename(self._path_of(new))
             del self._open[name]
-            self._open[new] = replace(draft, name=new)
-            return self._open[new]
+            return self._keep_open(replace(draft, name=new))
 
     def keep(self, name: str, file: str, text: str) -> None:
         """Keep a file beside the history of a scenario; it goes where the scenario goes."""
@@ -224,7 +224,14 @@ class Drafts:
 
     def _save_draft(self, draft: Draft, text: str) -> Draft:
         write_text(self._path_of(draft.name), text)
+        return self._keep_open(draft)
+
+    def _keep_open(self, draft: Draft) -> Draft:
+        """Keep a scenario in memory, and close those that were looked at longest ago."""
+        self._open.pop(draft.name, None)
         self._open[draft.name] = draft
+        while len(self._open) > MOST_OPEN:
+            del self._open[next(iter(self._open))]
         return draft
 
     def of_version(self, name: str, version: int) -> Draft:

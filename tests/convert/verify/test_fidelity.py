@@ -124,6 +124,33 @@ def test_a_node_beside_the_road_end_and_short_roads_lose_no_relation(node, short
     assert not fidelity.invented
 
 
+@pytest.mark.parametrize(("length", "missing"), [(3.0, []), (20.0, [("1.-1", "2.-1")])])
+def test_a_short_road_in_a_junction_of_sumo_is_crossed_and_a_longer_one_is_lost(length, missing):
+    odr = network(
+        road("1", section(lane(-1, after=-1)), length=60.0, after="road 2 start"),
+        road(
+            "2",
+            section(lane(-1, before=-1, after=-1)),
+            x=60.0,
+            length=length,
+            before="road 1 end",
+            after="road 3 start",
+        ),
+        road("3", section(lane(-1, before=-1)), x=60.0 + length, before="road 2 end"),
+    )
+    near, far = 58.0, 62.0 + length
+    shapes = {
+        "a_0": np.array([[0.0, -1.75], [near, -1.75]]),
+        ":j_0_0": np.array([[near, -1.75], [far, -1.75]]),
+        "c_0": np.array([[far, -1.75], [160.0 + length, -1.75]]),
+    }
+    net = HandNet(shapes, walked=(), links=(("a_0", "c_0", ":j_0_0"),), foes=())
+    fidelity = verify(bytes(net), odr, RoadTable.of(odr))
+    assert pairs(fidelity.missing)[:1] == missing
+    assert pairs(fidelity.invented) == ([("1.-1", "3.-1")] if missing else [])
+    assert fidelity.coverage.share > 0.99
+
+
 def test_a_moved_crossing_loses_its_crosswalk():
     fidelity = found(HandNet().moved(":j_c0_0", x=1.0))
     assert not fidelity.lost_crosswalks, "3 of its 4 m are left"

@@ -55,17 +55,30 @@ def rows_of(result: ImportedMap) -> dict[str, list[tuple[str, str, str]]]:
 
 
 def border_lines(model: OpenDrive) -> shapely.MultiLineString:
-    """All lane borders of a map, sampled every 5 cm."""
+    """All lane borders of a map, sampled every 5 cm along the border, not along the road.
+
+    Outside a bend a border is many times as long as its road, and coarse samples cut its corners.
+    """
     table = RoadTable.of(model)
     lines = []
     for row in range(len(table.lane_keys)):
         start, end = table.lane_s0[row], table.lane_s1[row]
-        s = np.linspace(start, end, max(2, math.ceil((end - start) / 0.05)))
-        lanes, roads = np.full(s.size, row), np.full(s.size, table.lane_road[row])
-        for t in table.lane_borders(lanes, s):
-            x, y, _ = table.points(roads, s, t, np.zeros(s.size))
-            lines.append(shapely.LineString(np.stack([x, y], axis=1)))
+        for side in (0, 1):
+            s = np.linspace(start, end, max(2, math.ceil((end - start) / 0.05)))
+            line = border_points(table, row, side, s)
+            steps = np.maximum(np.ceil(np.hypot(*np.diff(line, axis=0).T) / 0.05), 1.0)
+            index = np.concatenate([[0.0], np.cumsum(steps)])
+            s = np.interp(np.arange(index[-1] + 1.0), index, s)
+            lines.append(shapely.LineString(border_points(table, row, side, s)))
     return shapely.MultiLineString(lines)
+
+
+def border_points(table: RoadTable, lane: int, side: int, s: np.ndarray) -> np.ndarray:
+    """Points of the inner (0) or outer (1) border of a lane at s."""
+    t = table.lane_borders(np.full(s.size, lane), s)[side]
+    roads = np.full(s.size, table.lane_road[lane])
+    x, y, _ = table.points(roads, s, t, np.zeros(s.size))
+    return np.stack([x, y], axis=1)
 
 
 def distances(model: OpenDrive, lines: list[np.ndarray]) -> np.ndarray:

@@ -17,7 +17,7 @@ from odscen.convert.model.net import CROSSING
 from odscen.opendrive.objects import is_crosswalk, signal_kind
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES, lane_use
 from odscen.opendrive.sign_catalogue import country_of, sign_meaning
-from odscen.opendrive.topology import dead_ends, one_sided_links
+from odscen.opendrive.topology import cut_off_lanes, dead_ends, one_sided_links
 
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Mapping, Sequence
@@ -161,7 +161,7 @@ def _leading_nowhere(odr: OpenDrive, table: RoadTable) -> Iterator[ReportEntry]:
 
 
 def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> Iterator[ReportEntry]:
-    covered = covered_metres(lanes)
+    covered, cut_off = covered_metres(lanes), cut_off_lanes(odr)
     for row, key in enumerate(table.lane_keys):
         kind = table.lane_type[row]
         if is_used(kind):
@@ -169,7 +169,9 @@ def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> It
             gap = length - covered.get(key, 0.0)
             if gap > (AREA if kind in WALKABLE_TYPES and gap < length else WORTH_TELLING):
                 where = "" if odr.roads[key.road].junction is None else " of a connecting road"
-                why = _why_uncovered(odr, table, row, whole=gap >= length)
+                why = "it begins or ends at lanes that are closed to motor vehicles"
+                if key not in cut_off:
+                    why = _why_uncovered(odr, table, row, whole=gap >= length)
                 reason = f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: {why}"
                 outcome = ElementOutcome.KEPT if why == WALKING_AREA else ElementOutcome.LOST
                 yield ReportEntry(outcome, _describe_place(*key), reason)

@@ -33,10 +33,10 @@ from odscen.convert.verify.polyline_finder import PIECE_MIN, STEP, Finder, Polyl
 from odscen.convert.verify.signal_coverage import compare_lights
 from odscen.opendrive.objects import crosswalks
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
-from odscen.opendrive.topology import lane_successors, side_links
+from odscen.opendrive.topology import cut_off_lanes, lane_successors, side_links
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.base.ids import LaneKey, RoadId
@@ -52,6 +52,8 @@ LanePair = tuple[RoadLane, RoadLane]
 
 _END = 1.0
 """Metres at the end of a SUMO lane that say which lane of the map it comes from or leads to."""
+_BETWEEN_CROSSWALKS = 12.0
+"""Metres of road, at most, that a junction of SUMO may reach over."""
 _END_SHARES = (0.1, 0.3, 0.5, 0.7, 0.9)
 _LANE_SHARES = tuple((k + 0.5) / 10 for k in range(10))
 _APART = 2.0
@@ -92,19 +94,17 @@ def lane_relations(odr: OpenDrive, drivable: Sequence[LaneKey]) -> dict[LanePair
     return found
 
 
-def paths_over_short_lanes(
-    stated: Collection[LanePair], lengths: Mapping[RoadLane, float]
+def paths_over_lanes(
+    stated: Collection[LanePair], crossed: Collection[RoadLane]
 ) -> dict[LanePair, set[LanePair]]:
-    """Relations that follow each other over lanes shorter than a metre, by their outer lanes.
-
-    Nothing ever stops on so short a lane: SUMO may lead across it at once.
+    """Relations that follow each other over lanes that SUMO leads across at once, by outer lanes.
 
     Parameters
     ----------
     stated
         As :func:`lane_relations` gives them.
-    lengths
-        Length of each drivable lane outside junctions, metres.
+    crossed
+        Lanes outside of the map's junctions that have no edge of their own.
     """
     following: dict[RoadLane, list[RoadLane]] = defaultdict(list)
     for source, target in stated:
@@ -115,7 +115,7 @@ def paths_over_short_lanes(
         while todo:
             chain = todo.pop()
             last = chain[-1][1]
-            if lengths[last] >= _END or any(last == passed for passed, _ in chain):
+            if last not in crossed or any(last == passed for passed, _ in chain):
                 continue
             for further in following[last]:
                 longer = (*chain, (last, further))
@@ -291,7 +291,7 @@ def verify(
         If the network cannot be read.
     """
     net = read_net(net_xml, offset=offset)
-    drivable = _MapLanes(odr, table, DRIVABLE_TYPES)
+    drivable = _MapLanes(odr, table, DRIVABLE_TYPES, without=cut_off_lanes(odr))
     walkable = _MapLanes(odr, table, WALKABLE_TYPES)
     drives = net.driving("normal", "internal")
     on_roads, far_on_roads = _measure_deviation(net.driving("normal"), drivable)
@@ -340,9 +340,20 @@ class _MapLanes:
         Shape ``(P,)``: which of the places lie on connecting roads.
     """
 
-    def __init__(self, odr: OpenDrive, table: RoadTable, types: frozenset[str]) -> None:
+    def __init__(
+        self,
+        odr: OpenDrive,
+        table: RoadTable,
+        types: frozenset[str],
+        *,
+        without: Collection[LaneKey] = (),
+    ) -> None:
         self.odr, self.table = odr, table
-        chosen = [row for row, kind in enumerate(table.lane_type) if kind in types]
+        chosen = [
+            row
+            for row, kind in enumerate(table.lane_type)
+            if kind in types and table.lane_keys[row] not in without
+        ]
         self.rows: IntArray = np.array(chosen, dtype=np.int64)
         self.lines = _centre_lines(table, self.rows)
         self.finder = Finder(self.lines.cut(STEP))
@@ -443,10 +454,8 @@ def _compare_relations(
     lanes = {lane.id: lane for lane in net.driving("normal")}
     lane_of = [(key.road, key.lane) for key in keys]
     ends = sumo_ends(list(lanes.values()), outer, lane_of)
-    lengths: dict[RoadLane, float] = defaultdict(float)
-    for lane, length in zip(lane_of, drivable.lines.lengths.tolist(), strict=True):
-        lengths[lane] += length
-    paths = paths_over_short_lanes(stated, lengths) | {pair: {pair} for pair in stated}
+    crossed = _crossed_lanes(net, drivable)
+    paths = paths_over_lanes(stated, crossed) | {pair: {pair} for pair in stated}
     held: set[LanePair] = set()
     for pair in passed_over(list(lanes.values()), outer, lane_of):
         held |= paths.get(pair, set())
@@ -473,6 +482,33 @@ def _compare_relations(
         if (a, b) not in held
     ]
     return len(stated), tuple(missing), tuple(invented)
+
+
+def _crossed_lanes(net: NetFile, drivable: _MapLanes) -> set[RoadLane]:
+    """Lanes outside of the map's junctions that vehicles of SUMO cross, and never stop on.
+
+    They are shorter than a metre; or short, and all of them lies in a junction of SUMO, whose lanes
+    lead over them: the crosswalks at both ends leave no room for an edge.
+    """
+    on_edges, in_junctions = (
+        np.bincount(
+            drivable.places.owner,
+            weights=drivable.covered(net.driving(kind), directed=True),
+            minlength=len(drivable.rows),
+        )
+        for kind in ("normal", "internal")
+    )
+    lengths: dict[RoadLane, float] = defaultdict(float)
+    swallowed: dict[RoadLane, bool] = defaultdict(lambda: True)
+    for k, key in enumerate(drivable.keys()):
+        lane = (key.road, key.lane)
+        lengths[lane] += float(drivable.lines.lengths[k])
+        swallowed[lane] &= bool(on_edges[k] == 0 and in_junctions[k] > 0)
+    return {
+        lane
+        for lane, length in lengths.items()
+        if length < _END or (length < _BETWEEN_CROSSWALKS and swallowed[lane])
+    }
 
 
 def _point_xy(point: FloatArray) -> tuple[float, float]:

@@ -159,7 +159,7 @@ def recording_of(source: ExportSource) -> RunRecording:
 
 
 def seconds_option(options: Mapping[str, str], name: str) -> float | None:
-    """Seconds of an option, ``None`` if it is not given.
+    """Seconds that an option says, ``None`` if it was not chosen.
 
     Raises
     ------

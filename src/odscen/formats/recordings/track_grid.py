@@ -138,7 +138,7 @@ def tracks_of(source: ExportSource, recorded: RecordedRun, times: FloatArray) ->
         ego=next((row for row, user in enumerate(users) if user.ego), -1),
         length=np.array([user.length for user in users]),
         width=np.array([user.width for user in users]),
-        height=np.array([_body_height(source, user) for user in users]),
+        height=np.array([body_height(source, user) for user in users]),
         valid=np.stack([track.valid for track in found]),
         x=np.stack([track.x for track in found]),
         y=np.stack([track.y for track in found]),
@@ -148,7 +148,8 @@ def tracks_of(source: ExportSource, recorded: RecordedRun, times: FloatArray) ->
     )
 
 
-def _body_height(source: ExportSource, user: PlannedActor) -> float:
+def body_height(source: ExportSource, user: PlannedActor) -> float:
+    """Metres: of the road user's model, else of its category."""
     known = None if user.model is None else source.assets.dimensions(user.model)
     return (known or DEFAULT_BODY[Category(user.category)]).height
 

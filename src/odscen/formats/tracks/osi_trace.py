@@ -138,8 +138,14 @@ def _mcap_messages(file: Path) -> Iterator[tuple[int, int, bytes, bool]]:
         raise InputError(f"it is no MCAP: {error}") from error
 
 
-def _fields(content: bytes) -> Iterator[tuple[int, Any]]:
-    """Number and value of each field: an integer, a double, or the bytes of a message."""
+def osi_fields(content: bytes) -> Iterator[tuple[int, Any]]:
+    """Number and value of each field of a message: an integer, a double, or bytes.
+
+    Raises
+    ------
+    ValueError
+        If it is no message.
+    """
     at, size = 0, len(content)
     while at < size:
         tag, at = _varint(content, at)
@@ -179,18 +185,18 @@ def _varint(content: bytes, at: int) -> tuple[int, int]:
 
 
 def _first_message(content: bytes, number: int) -> bytes:
-    found = next((value for field, value in _fields(content) if field == number), b"")
+    found = next((value for field, value in osi_fields(content) if field == number), b"")
     return bytes(found)
 
 
 def _numbers(content: bytes) -> dict[int, Any]:
-    return dict(_fields(content))
+    return dict(osi_fields(content))
 
 
 def _objects_of(truth: bytes, begin: float, end: float) -> list[_Row]:
     time, rows = 0.0, []
     objects = []
-    for field, value in _fields(truth):
+    for field, value in osi_fields(truth):
         if field == _TIMESTAMP:
             stamp = _numbers(value)
             time = stamp.get(1, 0) + stamp.get(2, 0) / 1e9
@@ -199,8 +205,8 @@ def _objects_of(truth: bytes, begin: float, end: float) -> list[_Row]:
     if not begin <= time <= end:
         return []
     for content in objects:
-        parts = dict(_fields(content))
-        base = {k: _numbers(value) for k, value in _fields(parts.get(_BASE, b"")) if k <= 5}
+        parts = dict(osi_fields(content))
+        base = {k: _numbers(value) for k, value in osi_fields(parts.get(_BASE, b"")) if k <= 5}
         place, size = base.get(_POSITION, {}), base.get(_DIMENSION, {})
         velocity, change = base.get(_VELOCITY, {}), base.get(_ACCELERATION, {})
         kind = OSI_OBJECTS.get(parts.get(_TYPE, 0), "other")

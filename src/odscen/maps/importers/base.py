@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from odscen.base.checksums import digest
@@ -110,16 +110,24 @@ class ImportSettings:
         Its name; ``None`` is the one that recognises the file.
     options
         Of the importer; those that are not given have their usual values.
+    edits
+        Text of the edits that mend its OpenDRIVE (:mod:`odscen.maps.map_edits`); ``None`` are those
+        that a map of the same name has, if there is one.
     """
 
     importer: str | None = None
     options: Mapping[str, OptionValue] = field(default_factory=dict)
+    edits: str | None = None
 
     def completed_from(self, stored: ImportSettings) -> ImportSettings:
         """The same wish for a map that is there already: what it does not name stays."""
         if self.importer not in (None, stored.importer):
             return self
-        return ImportSettings(stored.importer, {**stored.options, **self.options})
+        return ImportSettings(stored.importer, {**stored.options, **self.options}, self.edits)
+
+    def with_edits_of(self, stored: ImportSettings) -> ImportSettings:
+        """The same wish; edits of the map that is there stay, if it names none."""
+        return replace(self, edits=stored.edits) if self.edits is None else self
 
 
 DETECTED = ImportSettings()
@@ -138,7 +146,9 @@ class ImportRecord(NamedTuple):
     original
         Its name in the map's folder.
     entries
-        Rows of the importer, for the import report.
+        Rows of the importer, for the import report, and of the edits.
+    edits
+        Text of the edits that mend its OpenDRIVE.
     """
 
     importer: str
@@ -147,6 +157,7 @@ class ImportRecord(NamedTuple):
     sha256: str
     original: str
     entries: tuple[ReportEntry, ...]
+    edits: str | None = None
 
     @classmethod
     def of(
@@ -163,4 +174,5 @@ class ImportRecord(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Form for ``map.json``, without the rows, which are in the import report."""
-        return {key: value for key, value in self._asdict().items() if key != "entries"}
+        told = {key: value for key, value in self._asdict().items() if key != "entries"}
+        return {key: value for key, value in told.items() if key != "edits" or value}

@@ -133,13 +133,13 @@ def import_map(
     Returns
     -------
     tuple
-        The OpenDRIVE, and how it was made; ``None`` if the file is OpenDRIVE already.
+        The OpenDRIVE, and how it was made; ``None`` if the file is that already, without edits.
 
     Raises
     ------
     InputError
         If no importer takes the file, an option is not possible, or the importer refuses the file
-        or fails.
+        or fails; or if an edit cannot be read. Edits that do not fit are rows of the report.
     """
     importer = (
         importer_for(content, file)
@@ -147,7 +147,7 @@ def import_map(
         else importer_named(settings.importer)
     )
     options = values_for(type(importer), settings.options, name=f"importer {importer.name}")
-    if isinstance(importer, OpenDriveImporter):
+    if isinstance(importer, OpenDriveImporter) and not settings.edits:
         importer.to_opendrive(content, options)
         return content, None
     progress("converting the file to OpenDRIVE", 0.0)
@@ -165,6 +165,13 @@ def import_map(
     record = ImportRecord.of(
         importer, content, original=_ORIGINAL + suffix, options=options, entries=entries
     )
+    if settings.edits:
+        from odscen.maps.map_edits import mend_map, read_edits
+
+        progress("mending the map", 0.05)
+        mended = mend_map(xodr, read_edits(settings.edits), file=file)
+        xodr = mended.xodr
+        record = record._replace(entries=(*entries, *mended.entries), edits=mended.edits)
     return xodr, record
 
 

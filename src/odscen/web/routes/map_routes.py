@@ -13,15 +13,17 @@ from fastapi import APIRouter, File, Form, UploadFile
 from starlette.requests import Request
 from starlette.responses import Response
 
-from odscen.app.maps import load_map
+from odscen.app.maps import load_map, map_to_mend
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.checksums import digest
 from odscen.base.errors import ConflictError, DamagedError, InputError, OdscenError
 from odscen.convert.model.conversion_settings import ConversionSettings
 from odscen.learning.offered_options import OptionValue, options_of
+from odscen.maps.edited_map import EditRefusedError
 from odscen.maps.folder_names import check_name, name_from_file
 from odscen.maps.importers.base import ImportSettings
 from odscen.maps.importers.registry import map_importers
+from odscen.maps.map_edits import read_edits
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import is_outdated
 from odscen.maps.traffic_losses import traffic_losses
@@ -40,6 +42,7 @@ from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph
 from odscen.web.services import Shared
 from odscen.web.wire.map_messages import (
     BrokenMapInfo,
+    ConversionEntry,
     ConversionInfo,
     DrawingColumns,
     GraphColumns,
@@ -47,10 +50,13 @@ from odscen.web.wire.map_messages import (
     ImporterInfo,
     LightInfo,
     MapDetails,
+    MapEdits,
+    MapEditsInfo,
     MapHeader,
     MapInfo,
     NetCounts,
     NetworkOrigin,
+    PlaceInfo,
     SemanticsInfo,
 )
 from odscen.web.wire.media_types import SVG
@@ -123,6 +129,41 @@ def graph(name: str, request: Request, shared: Shared) -> Response:
 def report(name: str, shared: Shared) -> ConversionInfo:
     """What became of each element of the map on the way to SUMO."""
     return ConversionInfo.model_validate(shared.workspace.map(name).info["report"])
+
+
+@router.get("/maps/{name}/place")
+def show_place(name: str, x: float, y: float, shared: Shared) -> PlaceInfo:
+    """What is at a place, metres: the lane there, and what can be removed."""
+    try:
+        place = map_to_mend(shared.workspace.map(name)).describe_place(x, y)
+    except EditRefusedError as error:
+        raise InputError(str(error)) from error
+    return PlaceInfo.model_validate({**place._asdict(), "ring": [*place.ring]})
+
+
+@router.get("/maps/{name}/edits")
+def show_edits(name: str, shared: Shared) -> MapEditsInfo:
+    """Edits that mend a map, and what became of each."""
+    entry = shared.workspace.map(name)
+    rows = [ConversionEntry.model_validate(row) for row in entry.edit_rows()]
+    return MapEditsInfo(edits=read_edits(entry.importing.edits or "[]"), rows=rows)
+
+
+@router.post("/maps/{name}/edits", status_code=202)
+def mend_map(name: str, body: MapEdits, shared: Shared) -> JobStarted:
+    """Mend a map by edits, in place of those that it has; it is built anew in the background."""
+    shared.workspace.stored(name)
+    out = name if body.out is None else check_name(body.out)
+    edits = [edit.model_dump(exclude_none=True) for edit in body.edits]
+
+    def work(progress: ProgressCallback) -> JobResult:
+        progress("starting", 0.0)
+        workspace = shared.workspace
+        return JobResult(
+            workspace.mend_map(name, edits, out=out, anew=True, progress=progress).name
+        )
+
+    return JobStarted(job=shared.jobs.start(work, subject=f"map {out!r}"))
 
 
 @router.post("/maps", status_code=202)

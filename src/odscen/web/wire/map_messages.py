@@ -7,15 +7,18 @@ shape: they are sent unchecked.
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from odscen.base.arrays import Bounds
 from odscen.convert.model.conversion_report import ElementOutcome
 from odscen.convert.model.conversion_settings import ConverterName
 from odscen.lanegraph.map_statistics import MapStatistics
+from odscen.maps.map_edits import MapEdit
 from odscen.maps.traffic_losses import LossKind
 from odscen.opendrive.objects import SignalKind
-from odscen.web.messages import Answer, OptionInfo
+from odscen.web.messages import Answer, Name, OptionInfo, RequestBody
 
 Point = tuple[float, float]
 """x and y, metres."""
@@ -171,6 +174,28 @@ class MapDetails(MapInfo):
     lights: list[LightInfo]
 
 
+class PlaceInfo(Answer):
+    """What is at a place of a map: its lane, with outline, and what is near it.
+
+    Width in metres, limit in km/h, direction of driving in rad.
+    """
+
+    road: str
+    type: str
+    width: float
+    limit: float | None
+    hdg: float
+    ring: list[Point]
+    parts: list[Literal["stop_line", "crosswalk", "light", "sign"]]
+
+
+class MapEdits(RequestBody):
+    """All edits of a map, in place of those that it has; ``out`` is the map that gets them."""
+
+    edits: list[MapEdit]
+    out: Name | None = None
+
+
 class ConversionEntry(Answer):
     """What became of one element, and why.
 
@@ -182,6 +207,13 @@ class ConversionEntry(Answer):
     reason: str
     confidence: float | None = None
     source_id: str | None = None
+
+
+class MapEditsInfo(Answer):
+    """Edits of a map in their order, and what became of each; the row of edit n has number n."""
+
+    edits: list[MapEdit]
+    rows: list[ConversionEntry]
 
 
 class ConversionInfo(Answer):

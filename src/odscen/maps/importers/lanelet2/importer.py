@@ -22,7 +22,7 @@ class Lanelet2Importer(MapImporter):
     name = "lanelet2"
     label = "Lanelet2 (.osm with lanelets, also Autoware's)"
     suffixes = (".osm",)
-    version = "1"
+    version = "2"
     options: ClassVar[Any] = {
         "properties": {
             "origin": {

@@ -32,6 +32,8 @@ _HEIGHT_TOLERANCE = 0.01
 _ROLL_TOLERANCE = 0.002
 _STEP, _FINE_STEP, _BENT = 0.5, 0.1, 0.01
 """Metres between stations; the fine one where the curvature, 1/m, is larger than the last."""
+_CHORD = 0.001
+"""Metres by which a border may be off the line between its places at two stations."""
 _SPACINGS = (math.inf, 80.0, 40.0, 20.0, 10.0, 5.0, 2.5, 1.25)
 """Distances between the points that the reference line runs through, metres, as tried."""
 _NEAR = 0.02
@@ -341,10 +343,17 @@ def _choose_stations(plan: PlanView, length: float, borders: Sequence[FloatArray
     """Choose where borders are measured: evenly, and at each corner of a border."""
     coarse = np.linspace(0.0, length, max(9, math.ceil(length / _STEP) + 1))
     fine = np.linspace(0.0, length, max(9, math.ceil(length / _FINE_STEP) + 1))
-    bent = np.abs(plan.at(np.zeros(fine.size, dtype=np.int64), fine).curvature) > _BENT
-    even = np.concatenate([coarse, fine[bent]])
-    corners = [_locate_points(plan, length, border)[0] for border in borders]
-    stations: FloatArray = np.sort(np.concatenate([even, *corners]))
+    bend = np.abs(plan.at(np.zeros(fine.size, dtype=np.int64), fine).curvature)
+    located = [_locate_points(plan, length, border) for border in borders]
+    reach = max(float(np.abs(t).max()) for _, t in located)
+    # Seen from a bend a straight border is d / cos(angle): its second derivative is t curvature^2.
+    curvature = np.maximum(bend[:-1], bend[1:])
+    steps = np.maximum(np.ceil(np.diff(fine) * curvature * math.sqrt(reach / (8.0 * _CHORD))), 1.0)
+    starts = np.repeat(np.arange(steps.size), steps.astype(np.int64))
+    share = (np.arange(starts.size) - np.searchsorted(starts, starts)) / steps[starts]
+    within = fine[starts] + share * np.diff(fine)[starts]
+    even = np.concatenate([coarse, within[curvature[starts] > _BENT]])
+    stations: FloatArray = np.sort(np.concatenate([even, *(s for s, _ in located)]))
     kept = np.concatenate([[True], np.diff(stations) > 1e-3])
     stations = stations[kept]
     stations[0], stations[-1] = 0.0, length
@@ -466,16 +475,14 @@ def _fit_cubic(
         return Cubic(float(s[first]), a, rise / size, 0.0, 0.0)
     u = (s[first : last + 1] - s[first]) / size
     rest = values[first : last + 1] - a - rise * u
+    # Between stations, too: through four of them there is always a cubic, which swings where the
+    # border has a corner.
+    between = np.interp(np.arange(4 * (last - first) + 1) / 4.0, np.arange(u.size), u)
+    rest, u = np.interp(between, u, rest), between
     if float(np.abs(rest).max()) <= tolerance / 3.0:
         return Cubic(float(s[first]), a, rise / size, 0.0, 0.0)
     if floor and float(values[first : last + 1].min()) < 4.0 * tolerance:
         return None
-    if last == first + 2:
-        return (
-            None
-            if float(np.abs(rest).max()) > tolerance
-            else Cubic(float(s[first]), a, rise / size, 0.0, 0.0)
-        )
     shape = u * (1.0 - u)
     terms = np.stack([shape, shape * u], axis=1)
     alpha, beta = np.linalg.lstsq(terms, rest, rcond=None)[0].tolist()
