@@ -793,8 +793,10 @@ export interface components {
          *     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-         *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+         *     positive to the left of the driving direction, ``longitudinal_offset`` in it: metres from the
+         *     node to the centre of the body. ``size`` is that of its body; ``None`` is that of its model, or
+         *     the usual one of its category. ``style`` is a driving style or the id of a driver set of the
+         *     scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
          *     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
          *     their order; an open goal is one that can be reached from the last of them. ``driver`` is who
          *     drives a vehicle that no rule moves: SUMO, or the ``story`` alone, which keeps its initial speed
@@ -811,6 +813,9 @@ export interface components {
             speed: number | null;
             /** @default 0 */
             lateral_offset: number;
+            /** @default 0 */
+            longitudinal_offset: number;
+            size: components["schemas"]["BodySize-Output"] | null;
             /** @default 0 */
             depart: number;
             initial_speed: number | null;
@@ -858,6 +863,8 @@ export interface components {
             via?: string[];
             speed?: number | null;
             lateral_offset?: number;
+            longitudinal_offset?: number;
+            size?: components["schemas"]["BodySize-Input"] | null;
             depart?: number;
             initial_speed?: number | null;
             style?: string;
@@ -1095,6 +1102,18 @@ export interface components {
             width: number;
             height: number;
         };
+        /** @description Bounding box of a road user, metres; without a height it has that of its category. */
+        "BodySize-Input": {
+            length: number;
+            width: number;
+            height?: number | null;
+        };
+        /** @description Bounding box of a road user, metres; without a height it has that of its category. */
+        "BodySize-Output": {
+            length: number;
+            width: number;
+            height: number | null;
+        };
         Body_add_map_api_maps_post: {
             /** @description A map of any format of `/map-importers`. */
             file: string;
@@ -1191,6 +1210,8 @@ export interface components {
             via?: string[];
             speed?: number | null;
             lateral_offset?: number;
+            longitudinal_offset?: number;
+            size?: components["schemas"]["BodySize-Input"] | null;
             depart?: number;
             initial_speed?: number | null;
             style?: string;
@@ -1313,8 +1334,8 @@ export interface components {
          */
         "Condition-Input": {
             time?: components["schemas"]["AfterTime"] | null;
-            ttc?: components["schemas"]["PairBounded-Input"] | null;
-            headway?: components["schemas"]["PairBounded-Input"] | null;
+            ttc?: components["schemas"]["SecondsBetween-Input"] | null;
+            headway?: components["schemas"]["SecondsBetween-Input"] | null;
             distance?: components["schemas"]["DistanceBounded-Input"] | null;
             relative_speed?: components["schemas"]["PairBounded-Input"] | null;
             speed?: components["schemas"]["OwnBounded-Input"] | null;
@@ -1347,8 +1368,8 @@ export interface components {
          */
         "Condition-Output": {
             time: components["schemas"]["AfterTime"] | null;
-            ttc: components["schemas"]["PairBounded-Output"] | null;
-            headway: components["schemas"]["PairBounded-Output"] | null;
+            ttc: components["schemas"]["SecondsBetween-Output"] | null;
+            headway: components["schemas"]["SecondsBetween-Output"] | null;
             distance: components["schemas"]["DistanceBounded-Output"] | null;
             relative_speed: components["schemas"]["PairBounded-Output"] | null;
             speed: components["schemas"]["OwnBounded-Output"] | null;
@@ -3601,11 +3622,14 @@ export interface components {
         /**
          * @description ``digest`` is the same where scenarios differ at most in name and description.
          *
-         *     ``counts`` is how many counts of vehicles the scenario has.
+         *     ``counts`` is how many counts of vehicles the scenario has, ``clock`` the time of day at the
+         *     start, seconds, 0 without one.
          */
         RunContent: {
             digest: string;
             counts: number;
+            /** @default 0 */
+            clock: number;
         };
         /**
          * @description Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
@@ -3675,7 +3699,8 @@ export interface components {
          *     ``finished`` is when its results were written, in seconds since 1970. ``preparing`` says how far
          *     routes by travel time have been found before it begins. ``carla`` says that it is
          *     shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
-         *     ``slices``; one that is ``interrupted`` can go on from the last of them.
+         *     ``slices``; one that is ``interrupted`` can go on from the last of them. ``clock`` is the time
+         *     of day at the start, seconds, while the server still has the scenario (see ``RunContent``).
          */
         RunInfo: {
             run: string;
@@ -3692,6 +3717,7 @@ export interface components {
             carla: boolean;
             slices: components["schemas"]["RunSlices"] | null;
             preparing: string | null;
+            clock: number | null;
         };
         /**
          * @description What vehicles did on each lane in each interval of a run.
@@ -3967,6 +3993,36 @@ export interface components {
             label: string;
             undo: string | null;
             redo: string | null;
+        };
+        /**
+         * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
+         *
+         *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         */
+        "SecondsBetween-Input": {
+            below?: number | null;
+            above?: number | null;
+            of?: string | null;
+            to: string;
+            /** @default true */
+            free?: boolean;
+            /** @default false */
+            ahead?: boolean;
+        };
+        /**
+         * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
+         *
+         *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         */
+        "SecondsBetween-Output": {
+            below: number | null;
+            above: number | null;
+            of: string | null;
+            to: string;
+            /** @default true */
+            free: boolean;
+            /** @default false */
+            ahead: boolean;
         };
         /** @description A segment and its neighbours, which are rows. */
         SegmentInfo: {

@@ -1,5 +1,6 @@
 import { VisuallyHidden } from "@mantine/core";
-import { useCallback, useMemo, useRef, useState } from "react";
+import { plural, t } from "@lingui/core/macro";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import { type Assets, CATEGORIES, type MapDetails } from "../api/types";
 import { signals } from "../api/signals";
@@ -8,7 +9,9 @@ import type { Place } from "../map/graph";
 import type { LoadedGraph } from "../map/loaded";
 import { signalEditing } from "../signals/editing";
 import { SignalPanel } from "../signals/SignalPanel";
-import { EditorSteps } from "./EditorSteps";
+import { useStarter } from "./asked";
+import { bringsTraffic } from "./demand";
+import { EditorSteps, type Hindrance } from "./EditorSteps";
 import { copyTool } from "./handlers/copy";
 import { flowTool } from "./handlers/flow";
 import { goalTool } from "./handlers/goal";
@@ -22,11 +25,13 @@ import { useKeys } from "./keys";
 import { isFlow } from "./placing";
 import { Problems } from "./Problems";
 import { RefusalAlert } from "./RefusalAlert";
+import type { Step } from "./scene";
 import { Stage } from "./Stage";
 import type { EditorStore } from "./store";
+import { useRunChoices } from "./runChoices";
 import { firstVisit, Tour, tourSeen } from "./Tour";
 import { useAskBeforeClosing, useFinishedOnLeaving } from "../ui/leaving";
-import { useEditing } from "./useEditing";
+import { type EditorNow, useEditing } from "./useEditing";
 
 /** The editor of one scenario: its steps, its map and its table, and the keys that hold in all of them. */
 export function Editor({
@@ -74,6 +79,16 @@ export function Editor({
     setTour(false);
   };
   const { ones, selection, select, arm, tool } = now;
+  const choices = useRunChoices(name, scenario.document.simulation.duration);
+  const starter = useStarter(name);
+  const hindrance = hindranceOf(now);
+  const run = useLatest(() => {
+    if (hindrance) {
+      const [step, words] = wantedFirst(now, hindrance);
+      now.openStep(step);
+      now.say(words);
+    } else starter.start(choices.started);
+  });
   const copied = useRef<readonly string[]>([]);
   const moveTo = (place: Place | null): void => {
     if (now.one && place) now.changes.setStart(now.one, place.id);
@@ -83,6 +98,7 @@ export function Editor({
     redo: () => void redo(),
     sheet: openHelp,
     find: openFinding,
+    run,
     remove: () => now.changes.remove(selection),
     escape: () => {
       if (now.pick.now) now.pick.stop();
@@ -131,6 +147,8 @@ export function Editor({
       <VisuallyHidden component="h1">{scenario.document.name}</VisuallyHidden>
       <HeadTools
         store={store}
+        starting={starter.busy}
+        onRun={run}
         onFind={openFinding}
         onHelp={openHelp}
         onTour={openTour}
@@ -138,7 +156,16 @@ export function Editor({
         onVector={vector}
       />
       <div className="side">
-        <EditorSteps store={store} now={now} drawing={drawing} assets={assets} />
+        <EditorSteps
+          store={store}
+          now={now}
+          drawing={drawing}
+          assets={assets}
+          choices={choices}
+          hindrance={hindrance}
+          starting={starter.busy}
+          onRun={run}
+        />
         <Problems problems={now.problems} graph={now.graph} onShow={now.showProblem} />
       </div>
       <Stage now={now} saving={saving === "saving"} drawing={drawing}>
@@ -167,4 +194,30 @@ export function Editor({
       <HelpSheet open={help} onClose={() => setHelp(false)} />
     </div>
   );
+}
+
+/** What keeps the scenario from being run now. */
+function hindranceOf({ problems, ones, document: { demand, sumo } }: EditorNow): Hindrance | null {
+  const errors = problems.filter(({ severity }) => severity === "error").length;
+  const empty = ones.length === 0 && !bringsTraffic(demand) && !sumo;
+  return errors > 0 || empty ? { errors, empty } : null;
+}
+
+/** The step in which the first thing that is missing for a run is to be done, and what that is. */
+function wantedFirst({ document }: EditorNow, { errors, empty }: Hindrance): [Step, string] {
+  if (document.roi.length === 0) return ["region", t`Choose the region first: click a road or a junction.`];
+  if (empty) return ["actors", t`There are no road users yet: choose a kind, then click on the map.`];
+  return [
+    "run",
+    t`${plural(errors, { one: "# problem", other: "# problems" })} to solve first; a click on one in the list shows where.`,
+  ];
+}
+
+/** The same function always, which does what the newest one does. */
+function useLatest(act: () => void): () => void {
+  const latest = useRef(act);
+  useEffect(() => {
+    latest.current = act;
+  });
+  return useCallback(() => latest.current(), []);
 }

@@ -8,12 +8,12 @@ import type { Assets, Edit } from "../api/types";
 import { inBounds, inCircle } from "../map/areas";
 import type { PackedDrawing } from "../map/drawing";
 import { ActorStep } from "./ActorStep";
-import { useStarter } from "./asked";
 import { criteriaNote } from "./criteria";
 import { CriteriaStep } from "./CriteriaStep";
 import { profilesOf } from "./DayProfiles";
 import { bringsTraffic, trafficNote } from "./demand";
 import { EnvironmentStep } from "./EnvironmentStep";
+import { LightsStep, lightsNote } from "./LightsStep";
 import { measureNote } from "./measures";
 import { MeasuresStep } from "./MeasuresStep";
 import { MapStep, RegionStep } from "./MapSteps";
@@ -22,6 +22,7 @@ import { parameterNote } from "./parameters";
 import { ParametersStep } from "./ParametersStep";
 import { ruleNote, RulesStep } from "./rules/RulesStep";
 import { rowsWithin } from "./regions";
+import type { RunChoices } from "./runChoices";
 import { RunStep } from "./RunStep";
 import { Steps } from "./Steps";
 import type { EditorStore } from "./store";
@@ -37,6 +38,17 @@ interface Props {
   now: EditorNow;
   drawing: PackedDrawing;
   assets: Assets | null;
+  choices: RunChoices;
+  /** What keeps the scenario from being run. */
+  hindrance: Hindrance | null;
+  starting: boolean;
+  onRun: () => void;
+}
+
+/** Errors to be solved, or no road users. */
+export interface Hindrance {
+  errors: number;
+  empty: boolean;
 }
 
 /** The steps, each with its forms; they are not made anew as the pointer moves. */
@@ -46,14 +58,15 @@ export const EditorSteps = memo(
     before.store === after.store &&
     before.drawing === after.drawing &&
     before.assets === after.assets &&
+    before.choices === after.choices &&
+    before.starting === after.starting &&
     sameButPointer(old, now),
 );
 
-function AllSteps({ store, now, drawing, assets }: Props) {
+function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, onRun }: Props) {
   const {
     scenario: { name, version },
     document,
-    problems,
     graph,
     region,
     ones,
@@ -64,7 +77,6 @@ function AllSteps({ store, now, drawing, assets }: Props) {
     openStep,
   } = now;
   const { roi, demand, environment, map, measures, study, transit } = document;
-  const run = useStarter(name);
   const [filling, setFilling] = useState(false);
   const profiles = useMemo(() => profilesOf(demand, assets?.day_profiles ?? {}), [demand, assets]);
   const selected = useMemo(() => {
@@ -75,8 +87,8 @@ function AllSteps({ store, now, drawing, assets }: Props) {
     const kinds = new Map(graph.columns.segments.map(({ id, kind }) => [id, kind]));
     return roi.filter((id) => kinds.get(id) !== "junction");
   }, [graph, roi]);
-  const errors = problems.filter(({ severity }) => severity === "error").length;
-  const lights = drawing.symbols.some(([kind]) => kind.includes("light"));
+  const errors = hindrance?.errors ?? 0;
+  const junctions = now.lights?.junctions ?? [];
 
   const addNeighbours = (): void =>
     changes.change(
@@ -180,14 +192,14 @@ function AllSteps({ store, now, drawing, assets }: Props) {
                 />
                 {ones.length > 0 && (
                   <Button variant="default" onClick={() => openStep("traffic")}>
-                    <Trans>Next: traffic</Trans>
+                    <Trans>Next: demand</Trans>
                   </Button>
                 )}
               </>
             ),
         },
         traffic: {
-          title: t`Traffic`,
+          title: t`Demand`,
           done: bringsTraffic(demand),
           note: trafficNote(demand),
           body: (
@@ -200,8 +212,8 @@ function AllSteps({ store, now, drawing, assets }: Props) {
                 onEdit={changes.change}
                 onShow={sights.segments}
               />
-              <Button onClick={() => openStep("run")}>
-                <Trans>Next: run</Trans>
+              <Button variant="default" onClick={() => openStep("transit")}>
+                <Trans>Next: public transport</Trans>
               </Button>
             </>
           ),
@@ -217,6 +229,20 @@ function AllSteps({ store, now, drawing, assets }: Props) {
               pick={now.pick}
               onEdit={changes.change}
               onShow={sights.nodes}
+            />
+          ),
+        },
+        lights: {
+          title: t`Traffic lights`,
+          done: document.signals.junctions.length > 0,
+          note: now.lights ? lightsNote(junctions) : "…",
+          body: (
+            <LightsStep
+              junctions={junctions}
+              shown={now.light}
+              control={document.signals.control}
+              onEdit={changes.change}
+              onShow={now.showLight}
             />
           ),
         },
@@ -267,7 +293,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         study: {
-          title: t`Study`,
+          title: t`Analysis`,
           done: studyNote(study) !== WHOLE_RUN(),
           note: studyNote(study),
           body: (
@@ -297,16 +323,12 @@ function AllSteps({ store, now, drawing, assets }: Props) {
               name={name}
               version={version}
               document={document}
-              lights={lights}
+              choices={choices}
               blocked={errors > 0}
-              busy={run.busy}
-              empty={ones.length === 0 && !bringsTraffic(demand) && !document.sumo}
+              busy={starting}
+              empty={hindrance?.empty ?? false}
               onEdit={changes.change}
-              onRun={run.start}
-              onLights={() => {
-                const [first] = now.lights?.junctions ?? [];
-                if (first) now.showLight(first);
-              }}
+              onRun={onRun}
             />
           ),
         },

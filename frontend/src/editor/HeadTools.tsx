@@ -8,7 +8,7 @@ import { localized } from "../language/localized";
 import { api } from "../api/client";
 import { exchange } from "../api/exchange";
 import { isXosc } from "../exchange/useImport";
-import { IconHelp, IconMenu, IconRedo, IconSearch, IconTour, IconUndo } from "../ui/icons";
+import { IconHelp, IconMenu, IconPlay, IconRedo, IconSearch, IconTour, IconUndo } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
 import { go } from "../ui/address";
 import { ExportMenu } from "./ExportMenu";
@@ -26,6 +26,8 @@ type Dialog = "rename" | "copy" | "open" | null;
 /** Undo, redo, autosave and files, in the head of the page. */
 export const HeadTools = memo(function HeadTools({
   store,
+  starting,
+  onRun,
   onFind,
   onHelp,
   onTour,
@@ -33,6 +35,9 @@ export const HeadTools = memo(function HeadTools({
   onVector,
 }: {
   store: EditorStore;
+  /** Whether a run is being started. */
+  starting: boolean;
+  onRun: () => void;
   onFind: () => void;
   onHelp: () => void;
   onTour: () => void;
@@ -145,6 +150,11 @@ export const HeadTools = memo(function HeadTools({
         </Menu.Dropdown>
       </Menu>
       <ExportMenu name={name} onPicture={onPicture} onVector={onVector} />
+      <Tooltip label={t`Run the scenario (Ctrl+Enter)`}>
+        <Button leftSection={<IconPlay />} loading={starting} onClick={onRun}>
+          <Trans context="button">Run</Trans>
+        </Button>
+      </Tooltip>
       <input
         ref={file}
         type="file"

@@ -5,6 +5,7 @@ import { useEffect, useRef, useState } from "react";
 
 import { localized } from "../language/localized";
 import { nth } from "../lists";
+import { closesList } from "../ui/lists";
 import type { Step } from "./scene";
 
 const KEY = "odscen.tour";
@@ -62,7 +63,7 @@ export function Tour({ step, onClose }: { step: Step; onClose: () => void }) {
       role="dialog"
       aria-label={t`Short tour`}
       onKeyDown={(event) => {
-        if (event.key === "Escape") {
+        if (event.key === "Escape" && !closesList(event)) {
           onClose();
           event.stopPropagation();
         }

@@ -2,6 +2,7 @@ import { t } from "@lingui/core/macro";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { Assets, MapDetails, Problem, ScenarioDocument, ScenarioState } from "../api/types";
+import { countFrom } from "../language/moments";
 import type { LoadedGraph } from "../map/loaded";
 import type { MapHandle } from "../map/MapCanvas";
 import type { LightProgram } from "../api/signals";
@@ -76,6 +77,8 @@ export function useEditing(
   const { scenario, checked, selection, name, edit, select } = store();
   if (!scenario) throw new Error(t`the editor is only shown with a scenario`);
   const { document, problems } = scenario;
+  // What is shown below says moments as times of day if there is a clock.
+  countFrom(document.demand.clock, document.simulation.duration);
   const [step, setStep] = useState<Step>(() => keptStep() ?? firstStep(document));
   // A link selects who was selected when it was copied.
   useEffect(() => {

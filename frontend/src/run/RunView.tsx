@@ -8,6 +8,7 @@ import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import type { FitRow } from "../api/runs";
 import type { Category } from "../api/types";
 import { type LightProgram, signals } from "../api/signals";
+import { countFrom } from "../language/moments";
 import type { Pointed } from "../map/MapCanvas";
 import { seenInLog } from "../signals/occupancy";
 import { sceneDetectors } from "../signals/sceneDetectors";
@@ -28,7 +29,7 @@ import { RunGone } from "./RunGone";
 import { RunMap } from "./RunMap";
 import { RunSide } from "./RunSide";
 import { LiveStrip, ReplayStrip } from "./Strip";
-import { useCounts } from "./useCounts";
+import { useContent } from "./useContent";
 import { useIncidents } from "./useIncidents";
 import { useLightsAhead } from "./useLightsAhead";
 import { useLaneData } from "./useLaneUse";
@@ -77,7 +78,8 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   if (info && mode === null) setMode(ended ? "replay" : "live");
   const player = useReplay(run, mode === "replay" && replayable, show);
   const { incidents, add } = useIncidents(run, complete);
-  const counts = useCounts(run, replayable);
+  const content = useContent(run, replayable);
+  countFrom(info?.clock ?? content?.clock ?? 0);
   const [fit, setFit] = useState<readonly FitRow[] | null>(null);
   const [tab, setTab] = useState<string | null>(null);
   const shownTab = tab ?? (ended ? "result" : "users");
@@ -240,7 +242,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
           view={views.list.length > 1 ? viewName(views.list.indexOf(used) + 1, views.list.length) : null}
           incidents={incidents}
           categories={categories}
-          counts={counts}
+          counts={content?.counts ?? 0}
           onFit={setFit}
           lights={lights}
           junction={shownJunction}

@@ -13,7 +13,7 @@ import type { Category } from "../api/types";
 import { MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
 import { MARK_WORD, markKind, sentence } from "../run/incidents";
 import type { Shown } from "../signals/heads";
-import { clock } from "../ui/words";
+import { clock } from "../language/moments";
 import { Axis, Lines } from "./Axis";
 import { ZoomButtons } from "./ZoomButtons";
 import { panned, type Sight, toTime, toX, zoomed } from "./sight";

@@ -85,6 +85,24 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
   };
 }
 
+/** A traffic light of junction 10 with its head at a place. */
+const lightAt = (x: number, y: number): Heads =>
+  new Heads([
+    {
+      id: "J1",
+      names: ["10"],
+      green: [],
+      signals: [],
+      paths: [
+        [
+          [x, y],
+          [x + 1, y],
+        ],
+      ],
+      walks: [false],
+    },
+  ]);
+
 const at = (x: number, y: number, shift = false): Pointed => ({ x, y, reach: 0.5, shift });
 /** Centred on its lane, so that it is found where its start is. */
 const car = (id: string, spawn: string): Actor => ({ ...actor(id, spawn), lateral_offset: 0 });
@@ -122,7 +140,32 @@ test("a segment that holds the region together says so before it is clicked", ()
     "region",
   );
   expect(handler.hint(handler.under(at(2, 0)))).toContain("holds the region together");
-  expect(handler.hint(handler.under(at(4, 0)))).toBeNull();
+  expect(handler.hint(handler.under(at(4, 0)))).toBe("Click to take this segment out of the region");
+});
+
+test("a click on a signal inside the region shows its program and takes nothing out of the region", () => {
+  const { x, y } = place(FIRST);
+  const lights = lightAt(x, y);
+  const { log, handler } = using(null, scenario([], ["a"]), { lights }, "region");
+  expect(handler.hint(handler.under(at(x, y)))).toBe(
+    "Traffic light of junction 10: click to see its program",
+  );
+  handler.pick(at(x, y));
+  expect([log.edits, log.lights, log.steps]).toEqual([[], ["10"], ["lights"]]);
+  // Away from the signal it is said what a click would do; outside the region a signal stops no click.
+  expect(handler.hint({ is: "segment", row: 0 })).toBe("Click to take this segment out of the region");
+  const outside = using(null, scenario([], ["c"]), { lights }, "region");
+  outside.handler.pick(at(x, y));
+  expect([outside.log.edits, outside.log.lights]).toEqual([[{ kind: "grow_roi", segment: "a" }], []]);
+});
+
+test("in the step of the lights a click anywhere on a junction shows its program", () => {
+  const { x, y } = place(FIRST);
+  const { log, handler } = using(null, scenario([], ["a"]), { lights: lightAt(x, y) }, "lights");
+  handler.pick(at(x + 25, y));
+  handler.pick(at(x + 900, y));
+  expect(log.lights).toEqual(["10"]);
+  expect(handler.hint(null)).toBe("Click a junction with a traffic light to see its program");
 });
 
 test("a rectangle in the step of the region adds what lies in it and hangs together", () => {
@@ -459,21 +502,7 @@ test("the same tool is known again, and only one that makes something new clears
 test("a click on a traffic light shows its program, unless something is placed or stands there", () => {
   const log = new Log();
   const { x, y } = place(FIRST);
-  const lights = new Heads([
-    {
-      id: "J1",
-      names: ["10"],
-      green: [],
-      signals: [],
-      paths: [
-        [
-          [x, y],
-          [x + 1, y],
-        ],
-      ],
-      walks: [false],
-    },
-  ]);
+  const lights = lightAt(x, y);
   const free = editing(scenario([]), log, { lights });
   const handler = handlerFor("traffic", null, free);
   expect(handler.hint(handler.under(at(x, y)))).toBe(

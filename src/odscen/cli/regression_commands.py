@@ -178,8 +178,8 @@ def compare(
 ) -> None:
     """Put two runs, or several seeds of two, side by side: differences, with 95 % intervals."""
     from odscen.base.text_files import write_text
-    from odscen.experiments.compare import compare as compare_sides
     from odscen.experiments.comparison_page import comparison_page
+    from odscen.experiments.comparisons import compare as compare_sides
     from odscen.maps.store import Workspace
 
     # The page draws the map, if the workspace has it.

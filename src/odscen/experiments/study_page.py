@@ -112,14 +112,18 @@ def _completed_rows(table: pl.DataFrame) -> pl.DataFrame:
     return table.filter(pl.col("status") == str(RunStatus.COMPLETED))
 
 
-def _group_figures(table: pl.DataFrame, figures: Sequence[str]) -> list[StudyGroup]:
+def _group_figures(
+    table: pl.DataFrame, figures: Sequence[str], *, differences: bool = False
+) -> list[StudyGroup]:
     return [
         StudyGroup(
             str(scenario),
             str(variant),
             part.height,
             {
-                name: confidence_of(part[name].to_list(), share=_SHARE, figure=name)
+                name: confidence_of(
+                    part[name].to_list(), share=_SHARE, figure=name, lopsided=not differences
+                )
                 for name in figures
             },
             {name: part[name].drop_nulls().to_list() for name in figures},
@@ -146,7 +150,7 @@ def paired_differences(table: pl.DataFrame, figures: Sequence[str]) -> list[Stud
         first, on=_KEYS, suffix=" before", nulls_equal=True, maintain_order="left"
     )
     differences = [pl.col(name) - pl.col(f"{name} before") for name in figures]
-    return _group_figures(both.with_columns(differences), figures)
+    return _group_figures(both.with_columns(differences), figures, differences=True)
 
 
 def write_study_page(out: Path, figures: Sequence[str], file: Path) -> Path:

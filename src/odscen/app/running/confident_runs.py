@@ -5,9 +5,20 @@ interval of the mean is ``m +- h`` with
 
 ``h = t(0.975, n - 1) s / sqrt(n)``
 
-(Student's t). ``n`` runs are enough for an interval of ``+- share`` if ``h <= share |m|``; of more,
-the least ``n`` for which this holds with the ``s`` of the runs that there are (FHWA-HOP-18-036,
-appendix on the number of model runs).
+(Student's t). Near saturation a few runs break down, and of few seeds none may have: the scatter is
+lopsided, and this interval too short. So of five values and more, if all are above 0, it is Cox's
+for the mean of a log-normal figure, with Student's t: of logarithms with mean ``y`` and standard
+deviation ``u``
+
+``exp(y + u^2 / 2 +- t(0.975, n - 1) sqrt(u^2 / n + u^4 / (2 (n - 1))))``
+
+(Olsson, "Confidence intervals for the mean of a log-normal distribution", Journal of Statistics
+Education 13 (1), 2005); ``h`` reaches to the end that is further from ``m``. With a scatter of some
+percent both are the same.
+
+``n`` runs are enough for an interval of ``+- share`` if ``h <= share |m|``; of more, the least
+``n`` for which this holds with the scatter of the runs that there are (FHWA-HOP-18-036, appendix on
+the number of model runs).
 """
 
 from __future__ import annotations
@@ -26,9 +37,10 @@ from odscen.runs.reporter import SILENT
 from odscen.runs.run_settings import AS_DESIGNED
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
     from odscen.runs.reporter import Reporter
@@ -41,6 +53,8 @@ FEWEST = 5
 """Runs that the standard deviation is taken from at first."""
 _TAIL = 0.025
 _MOST = 10_000
+_LARGEST = 700.0
+"""Logarithm of a number up to which there are floating-point numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +116,12 @@ def _unit_suffix(figure: str) -> str:
 
 
 def confidence_of(
-    values: Sequence[float | None], *, share: float, figure: str = FIGURE, scenario: str = ""
+    values: Sequence[float | None],
+    *,
+    share: float,
+    figure: str = FIGURE,
+    scenario: str = "",
+    lopsided: bool = True,
 ) -> Confidence:
     """Confidence interval of a figure from its values by seed.
 
@@ -110,17 +129,18 @@ def confidence_of(
     ----------
     share
         Half the width wanted, as a share of the mean.
+    lopsided
+        Whether the figure may scatter further up than down, as differences do not.
     """
     known = [value for value in values if value is not None]
     if len(known) < 2:
         return Confidence(scenario, figure, None, None, share, len(known), None)
-    mean, scatter = statistics.fmean(known), statistics.stdev(known)
-    half = _half_width(scatter, len(known))
+    mean = statistics.fmean(known)
+    reach = (_cox_reach if lopsided and _looks_lognormal(known) else _student_reach)(known)
+    half = reach(len(known))
     needed = None
     if mean:
-        needed = next(
-            (n for n in _seed_counts() if _half_width(scatter, n) <= share * abs(mean)), None
-        )
+        needed = next((n for n in _seed_counts() if reach(n) <= share * abs(mean)), None)
     return Confidence(scenario, figure, mean, half, share, len(known), needed)
 
 
@@ -128,10 +148,35 @@ def _seed_counts() -> Sequence[int]:
     return range(2, _MOST)
 
 
-def _half_width(scatter: float, count: int) -> float:
-    from scipy.stats import t
+def _looks_lognormal(values: Sequence[float]) -> bool:
+    return len(values) >= FEWEST and 0.0 < min(values) < max(values)
 
-    return float(t.isf(_TAIL, count - 1)) * scatter / math.sqrt(count)
+
+def _student_reach(values: Sequence[float]) -> Callable[[int], float]:
+    """From the mean to an end of the interval, of so many runs that scatter like these."""
+    scatter = statistics.stdev(values)
+    return lambda count: _quantile(count) * scatter / math.sqrt(count)
+
+
+def _cox_reach(values: Sequence[float]) -> Callable[[int], float]:
+    """The same of a log-normal figure, to the further end."""
+    mean, logarithms = statistics.fmean(values), [math.log(value) for value in values]
+    spread = statistics.variance(logarithms)
+    middle = statistics.fmean(logarithms) + spread / 2.0
+
+    def reach(count: int) -> float:
+        error = math.sqrt(spread / count + spread * spread / (2.0 * (count - 1)))
+        high = middle + _quantile(count) * error
+        highest = math.exp(high) if high < _LARGEST else math.inf
+        return max(highest - mean, mean - math.exp(2.0 * middle - high))
+
+    return reach
+
+
+def _quantile(count: int) -> float:
+    from scipy.special import stdtrit
+
+    return float(stdtrit(count - 1, 1.0 - _TAIL))
 
 
 def parse_share(text: str) -> float:
@@ -154,7 +199,7 @@ def parse_share(text: str) -> float:
 
 def run_until_confident(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
     share: float,
     figure: str = FIGURE,

@@ -8,6 +8,7 @@ of it, and :mod:`~odscen.app.running.batches` for several. What a run is to be l
 
 from __future__ import annotations
 
+import logging
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -303,6 +304,9 @@ def carry_out(
                 figures=figures,
             )
     reporter.finished(result)
+    words = "run %s: %s, %g s simulated in %.1f s, in %s"
+    spent = result.known["sim_seconds"] or 0.0, result.known["wall_seconds"]
+    logging.getLogger("odscen").info(words, run.name, result.status, *spent, result.folder)
     return result
 
 

@@ -177,8 +177,20 @@ def _contact_event(one: ActorView, other: ActorView, time: float, step: float) -
         y=y,
         partner=hit.id,
         detail=BODIES,
-        values={"impact_speed": math.hypot(ax - bx, ay - by)},
+        values={
+            "impact_speed": math.hypot(ax - bx, ay - by),
+            "overlap": _overlap_of_width(hitting, hit),
+        },
     )
+
+
+def _overlap_of_width(hitting: ActorView, hit: ActorView) -> float:
+    """Share of the width of a body that hits which the other one is in front of."""
+    c, s = math.cos(hitting.hdg), math.sin(hitting.hdg)
+    aside = [(y - hitting.y) * c - (x - hitting.x) * s for x, y in hit.corners]
+    half = hitting.width / 2.0
+    shared = min(max(aside), half) - max(min(aside), -half)
+    return max(0.0, shared) / hitting.width
 
 
 def _view_before(actor_view: ActorView, seconds: float) -> ActorView:
