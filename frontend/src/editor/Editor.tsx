@@ -11,7 +11,9 @@ import { signalEditing } from "../signals/editing";
 import { SignalPanel } from "../signals/SignalPanel";
 import { useStarter } from "./asked";
 import { bringsTraffic } from "./demand";
-import { EditorSteps, type Hindrance } from "./EditorSteps";
+import { commandsOf } from "./commands";
+import { go } from "../ui/address";
+import { EditorSteps, type Hindrance, STEP_TITLE } from "./EditorSteps";
 import { copyTool } from "./handlers/copy";
 import { flowTool } from "./handlers/flow";
 import { goalTool } from "./handlers/goal";
@@ -23,15 +25,23 @@ import { HeadTools } from "./HeadTools";
 import { HelpSheet } from "./HelpSheet";
 import { useKeys } from "./keys";
 import { isFlow } from "./placing";
+import { boundsOfPlaces, isScene, type Step, STEPS } from "./scene";
+import { around } from "./sights";
 import { Problems } from "./Problems";
+import { RemoveUsed } from "./RemoveUsed";
 import { RefusalAlert } from "./RefusalAlert";
-import type { Step } from "./scene";
 import { Stage } from "./Stage";
 import type { EditorStore } from "./store";
+import { fit, type View } from "../map/view";
 import { useRunChoices } from "./runChoices";
 import { firstVisit, Tour, tourSeen } from "./Tour";
 import { useAskBeforeClosing, useFinishedOnLeaving } from "../ui/leaving";
 import { type EditorNow, useEditing } from "./useEditing";
+
+/** Pixels per metre from which on a car is well seen. */
+const LEGIBLE = 3;
+/** Metres around the starts of a scene. */
+const SCENE_MARGIN = 30;
 
 /** The editor of one scenario: its steps, its map and its table, and the keys that hold in all of them. */
 export function Editor({
@@ -87,7 +97,7 @@ export function Editor({
       const [step, words] = wantedFirst(now, hindrance);
       now.openStep(step);
       now.say(words);
-    } else starter.start(choices.started);
+    } else starter.start(choices.started, placeOfRun(now, handle.current?.view() ?? null));
   });
   const copied = useRef<readonly string[]>([]);
   const moveTo = (place: Place | null): void => {
@@ -187,8 +197,39 @@ export function Editor({
         <FindDialog
           graph={now.graph}
           ones={ones}
+          commands={commandsOf(
+            {
+              run,
+              undo: () => void undo(),
+              redo: () => void redo(),
+              openStep: now.openStep,
+              place: (category) => arm(placeTool(category)),
+              placeFlow: (walks) => arm(flowTool(walks)),
+              selectAll: () => {
+                now.openActors();
+                select(ones.map(({ id }) => id));
+              },
+              showAll: () => now.sights.bounds(drawing.bounds),
+              showRegion: () => now.sights.segments(scenario.document.roi),
+              runs: () => go({ view: "runs", scenario: name }),
+              studies: () => go({ view: "studies" }),
+              sweeps: () => go({ view: "sweeps", scenario: name }),
+              catalogue: () => go({ view: "catalogue" }),
+              help: openHelp,
+              tour: openTour,
+            },
+            STEPS.map((step) => [step, STEP_TITLE()[step]] as const),
+          )}
           onGo={({ is, id }) => now.show(is, id)}
           onClose={() => setFinding(false)}
+        />
+      )}
+      {now.removal && (
+        <RemoveUsed
+          asked={now.removal}
+          document={scenario.document}
+          onRemove={(uses) => now.changes.remove(now.removal?.ids ?? [], uses)}
+          onClose={() => now.setRemoval(null)}
         />
       )}
       <HelpSheet open={help} onClose={() => setHelp(false)} />
@@ -201,6 +242,18 @@ function hindranceOf({ problems, ones, document: { demand, sumo } }: EditorNow):
   const errors = problems.filter(({ severity }) => severity === "error").length;
   const empty = ones.length === 0 && !bringsTraffic(demand) && !sumo;
   return errors > 0 || empty ? { errors, empty } : null;
+}
+
+/** What a run has in sight first: what the editor has, or who acts in a scene if they are not well in it. */
+function placeOfRun({ document, graph, sights }: EditorNow, at: View | null): View | null {
+  const seen = sights.seen();
+  if (!isScene(document) || !at || !seen) return at;
+  const starts = document.actors.flatMap(({ spawn }) => graph.place(spawn) ?? []);
+  const [x0, y0, x1, y1] = seen;
+  const within = starts.every(({ x, y }) => x >= x0 && x <= x1 && y >= y0 && y <= y1);
+  if (starts.length === 0 || (within && at.scale >= LEGIBLE)) return at;
+  const [w, h] = [(x1 - x0) * at.scale, (y1 - y0) * at.scale];
+  return fit(around(boundsOfPlaces(starts), SCENE_MARGIN), { width: w, height: h });
 }
 
 /** The step in which the first thing that is missing for a run is to be done, and what that is. */

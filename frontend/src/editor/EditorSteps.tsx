@@ -6,6 +6,7 @@ import { memo, useMemo, useState } from "react";
 import type { Chosen } from "../api/models";
 import type { Assets, Edit } from "../api/types";
 import { inBounds, inCircle } from "../map/areas";
+import { localized } from "../language/localized";
 import type { PackedDrawing } from "../map/drawing";
 import { ActorStep } from "./ActorStep";
 import { criteriaNote } from "./criteria";
@@ -22,6 +23,7 @@ import { parameterNote } from "./parameters";
 import { ParametersStep } from "./ParametersStep";
 import { ruleNote, RulesStep } from "./rules/RulesStep";
 import { rowsWithin } from "./regions";
+import type { Step } from "./scene";
 import type { RunChoices } from "./runChoices";
 import { RunStep } from "./RunStep";
 import { Steps } from "./Steps";
@@ -50,6 +52,23 @@ export interface Hindrance {
   errors: number;
   empty: boolean;
 }
+
+/** What the steps are called. */
+export const STEP_TITLE = localized((): Record<Step, string> => ({
+  map: t`Map`,
+  region: t`Region`,
+  environment: t`Weather and time`,
+  actors: t`Road users`,
+  traffic: t`Demand`,
+  transit: t`Public transport`,
+  lights: t`Traffic lights`,
+  measures: t`Measures`,
+  rules: t`Rules`,
+  parameters: t`Parameters`,
+  study: t`Analysis`,
+  criteria: t`Criteria`,
+  run: t`Run`,
+}));
 
 /** The steps, each with its forms; they are not made anew as the pointer moves. */
 export const EditorSteps = memo(
@@ -99,19 +118,20 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
     setFilling(true);
     if (await changes.fill(share, seed, filler).finally(() => setFilling(false))) now.select([]);
   };
+  const titles = STEP_TITLE();
   return (
     <Steps
       open={now.step}
       onOpen={openStep}
       steps={{
         map: {
-          title: t`Map`,
+          title: titles.map,
           done: true,
           note: map.name,
           body: <MapStep name={map.name} onShow={() => sights.bounds(drawing.bounds)} />,
         },
         region: {
-          title: t`Region`,
+          title: titles.region,
           done: roi.length > 0,
           note: roi.length
             ? plural(roi.length, { one: "# segment", other: "# segments" })
@@ -137,7 +157,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           ),
         },
         environment: {
-          title: t`Weather and time`,
+          title: titles.environment,
           done: roi.length > 0,
           note: weatherNote(assets, environment.preset),
           body: assets ? (
@@ -152,7 +172,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           ),
         },
         actors: {
-          title: t`Road users`,
+          title: titles.actors,
           done: ones.length > 0,
           note: actorNote(document),
           body:
@@ -199,7 +219,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
             ),
         },
         traffic: {
-          title: t`Demand`,
+          title: titles.traffic,
           done: bringsTraffic(demand),
           note: trafficNote(demand),
           body: (
@@ -219,7 +239,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           ),
         },
         transit: {
-          title: t`Public transport`,
+          title: titles.transit,
           done: transit.lines.length > 0,
           note: transitNote(transit),
           body: (
@@ -233,7 +253,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           ),
         },
         lights: {
-          title: t`Traffic lights`,
+          title: titles.lights,
           done: document.signals.junctions.length > 0,
           note: now.lights ? lightsNote(junctions) : "…",
           body: (
@@ -247,7 +267,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           ),
         },
         measures: {
-          title: t`Measures`,
+          title: titles.measures,
           done: measures.length > 0,
           note: measureNote(measures),
           body: (
@@ -261,7 +281,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           ),
         },
         rules: {
-          title: t`Rules`,
+          title: titles.rules,
           done: document.rules.length > 0,
           note: ruleNote(document.rules),
           body: (
@@ -275,7 +295,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           ),
         },
         parameters: {
-          title: t`Parameters`,
+          title: titles.parameters,
           done: Object.keys(document.parameters).length > 0,
           note: parameterNote(document.parameters),
           body: (
@@ -287,13 +307,13 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
                 const user = ones.find((each) => each.id === id);
                 const rule = document.rules.find((each) => each.id === id);
                 if (root === "rules" && rule) sights.rule(rule, document.actors);
-                else if (user) sights.start(user);
+                else if (user) sights.close(user);
               }}
             />
           ),
         },
         study: {
-          title: t`Analysis`,
+          title: titles.study,
           done: studyNote(study) !== WHOLE_RUN(),
           note: studyNote(study),
           body: (
@@ -307,13 +327,13 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           ),
         },
         criteria: {
-          title: t`Criteria`,
+          title: titles.criteria,
           done: document.criteria.length > 0,
           note: criteriaNote(document.criteria),
           body: <CriteriaStep document={document} onEdit={changes.change} />,
         },
         run: {
-          title: t`Run`,
+          title: titles.run,
           done: false,
           note: errors
             ? t`${plural(errors, { one: "# problem", other: "# problems" })} to solve first`

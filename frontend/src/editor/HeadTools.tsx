@@ -89,7 +89,12 @@ export const HeadTools = memo(function HeadTools({
   };
   return createPortal(
     <>
-      <span className="saving" role="status" data-checked={checked === scenario?.document}>
+      <span
+        className="saving"
+        role="status"
+        data-checked={checked === scenario?.document}
+        data-state={saving}
+      >
         {SAVED()[saving]}
       </span>
       {tools.map(({ word, keys, label, act, icon }) => (
@@ -105,13 +110,8 @@ export const HeadTools = memo(function HeadTools({
           </ActionIcon>
         </Tooltip>
       ))}
-      <Tooltip label={t`Find a road, a junction or a road user (Ctrl+K)`}>
-        <ActionIcon
-          variant="default"
-          size="lg"
-          aria-label={t`Find a road, a junction or a road user`}
-          onClick={onFind}
-        >
+      <Tooltip label={t`Find a place or a road user, or do anything (Ctrl+K)`}>
+        <ActionIcon variant="default" size="lg" aria-label={t`Find or do`} onClick={onFind}>
           <IconSearch />
         </ActionIcon>
       </Tooltip>
@@ -122,8 +122,10 @@ export const HeadTools = memo(function HeadTools({
         onOpen={askForReport}
       >
         <Menu.Target>
-          <Button variant="default" leftSection={<IconMenu />}>
-            <Trans>Scenario</Trans>
+          <Button variant="default" leftSection={<IconMenu />} aria-label={t`Scenario`}>
+            <span className="wide-word">
+              <Trans>Scenario</Trans>
+            </span>
           </Button>
         </Menu.Target>
         <Menu.Dropdown>

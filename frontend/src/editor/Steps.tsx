@@ -5,6 +5,9 @@ import { localized } from "../language/localized";
 import { IconCheck } from "../ui/icons";
 import { type Step, STEP_GROUPS, type StepGroup } from "./scene";
 
+/** Pixels of a window in which all lies below each other; those of narrow.css. */
+const NARROW = 900;
+
 export interface StepText {
   title: string;
   note: string;
@@ -32,8 +35,13 @@ export function Steps({
   const list = useRef<HTMLDivElement>(null);
   const id = useId();
   useEffect(() => {
-    list.current?.querySelector("[aria-expanded=true]")?.scrollIntoView({ block: "nearest" });
-    list.current?.querySelector(".step-body")?.scrollIntoView({ block: "nearest" });
+    const head = list.current?.querySelector("[aria-expanded=true]");
+    // Where the page itself scrolls, a long form must not push its heading below the map.
+    if (innerWidth <= NARROW) void head?.scrollIntoView({ block: "start" });
+    else {
+      void head?.scrollIntoView({ block: "nearest" });
+      void list.current?.querySelector(".step-body")?.scrollIntoView({ block: "nearest" });
+    }
   }, [open]);
   return (
     <div className="steps" ref={list}>

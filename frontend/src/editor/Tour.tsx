@@ -24,8 +24,12 @@ const STEPS = localized((): readonly [title: string, text: string][] => [
   ],
 ]);
 
-/** Whether this is the first visit; without storage no visit is. */
+let offered = false;
+
+/** Whether this is the first visit; without storage no visit is, and who comes back from a run is none. */
 export function firstVisit(): boolean {
+  if (offered) return false;
+  offered = true;
   try {
     return localStorage.getItem(KEY) === null;
   } catch {

@@ -1,4 +1,5 @@
 import type { Actor, Assets, Bounds, Flow, Problem, ScenarioDocument } from "../api/types";
+import { bringsTraffic } from "./demand";
 import type { Area } from "../map/areas";
 import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
@@ -177,3 +178,15 @@ export function firstStep(document: ScenarioDocument): Step {
 export function boundsOfPlaces(places: readonly Place[]): Bounds {
   return places.map(({ x, y }): Bounds => [x, y, x, y]).reduce(join);
 }
+
+/** More placed road users than these are traffic. */
+export const MOST_ACTORS = 20;
+
+/** Whether a document is a story of some road users, without traffic around them. */
+export const isScene = ({ actors, flows, demand, transit, sumo }: ScenarioDocument): boolean =>
+  actors.length > 0 &&
+  actors.length <= MOST_ACTORS &&
+  flows.length === 0 &&
+  transit.lines.length === 0 &&
+  !bringsTraffic(demand) &&
+  !sumo;

@@ -8,6 +8,8 @@ import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import type { FitRow } from "../api/runs";
 import type { Category } from "../api/types";
 import { type LightProgram, signals } from "../api/signals";
+import { MOST_ACTORS } from "../editor/scene";
+import { around } from "../editor/sights";
 import { countFrom } from "../language/moments";
 import type { Pointed } from "../map/MapCanvas";
 import { seenInLog } from "../signals/occupancy";
@@ -38,6 +40,11 @@ import { useReplay } from "./useReplay";
 import { useViews } from "./useViews";
 import { viewName } from "./ViewButtons";
 import { useGround, useRun } from "./useRun";
+
+/** Metres around where the road users of a story have been. */
+const STORY_MARGIN = 20;
+/** Seconds of a long live run of few road users that are in sight first. */
+const STORY = 60;
 
 /** Watches one run from above; one that is resumed is watched anew. */
 export function RunView({ scenario, run }: { scenario: string; run: string }) {
@@ -128,6 +135,9 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     if (replay) keep({ time: player.time });
   }, [replay, player.time]);
   const known = player.replay?.crowd ?? crowd;
+  const extent = useMemo(() => player.replay?.extent(), [player.replay]);
+  // The recording says where its story was.
+  const bounds = extent ? around(extent, STORY_MARGIN) : player.loading ? null : ground.bounds;
   const categories = useMemo(
     () => new Map<string, Category>(known?.all().map((one) => [one.id, one.category]) ?? []),
     [known],
@@ -203,7 +213,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                   scene={scene}
                   heads={heads}
                   marks={marks}
-                  bounds={ground.bounds}
+                  bounds={bounds}
                   sight={sight}
                   views={views}
                   picture={picture}
@@ -268,6 +278,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
         plans={plans}
         ttc={ttc}
         spacing={player.replay?.spacing ?? 0.2}
+        first={live && longest > 2 * STORY && known && known.all().length <= MOST_ACTORS ? STORY : null}
         onSeek={player.replay ? jump : null}
         onShow={({ x, y }) => {
           if (x !== undefined && y !== undefined) place(x, y);

@@ -16,6 +16,7 @@ import { insideRows, sceneActors, sceneFlows, type Step } from "../../src/editor
 import { inBounds, inCircle, inRing } from "../../src/map/areas";
 import type { Pointed } from "../../src/map/MapCanvas";
 import { Picker } from "../../src/map/picking";
+import type { AskedRemoval } from "../../src/editor/uses";
 import { Heads } from "../../src/signals/heads";
 import { actor, flow, graph, place, scenario } from "../example";
 
@@ -27,6 +28,7 @@ class Log {
   steps: Step[] = [];
   selected: (readonly string[])[] = [];
   lights: string[] = [];
+  asked: AskedRemoval[] = [];
   done = 0;
 }
 
@@ -52,6 +54,7 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
     roi: document.roi,
     ones,
     starts,
+    sizeOf: () => [4, 1.8],
     region: { inside: document.roi, candidates: [], removable: document.roi, current: true },
     actors: sceneActors(graph, document, null, none, none),
     flows: sceneFlows(graph, document, none, none),
@@ -65,8 +68,10 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
       graph,
       roi: document.roi,
       ones,
+      document,
       starts,
       say: (text) => log.said.push(text),
+      ask: (removal) => log.asked.push(removal),
       edit: (edit, label) => {
         log.edits.push(edit);
         log.labels.push(label);
@@ -270,7 +275,7 @@ test("a copy is made once and does not take goals for places", () => {
   expect(log).toMatchObject({ labels: ["Copy a"], done: 1 });
 });
 
-test("of several that are moved those that find no free start are left out, and it is said", () => {
+test("of several that are moved those that find no free start in the region are left out, and it is said", () => {
   const flows = [flow("f", "ped.1.0.3.0")];
   const free = using(moveTool(["a", "f"]), scenario([car("a", FIRST)], ["a", "b"], flows));
   free.handler.pick(at(2.1, 0));
@@ -286,7 +291,7 @@ test("of several that are moved those that find no free start are left out, and 
   full.handler.pick(at(2.1, 0));
   expect(full.log).toMatchObject({
     edits: [[a]],
-    said: ["1 road user found no free point there and was left out."],
+    said: ["1 road user found no free point in the region and was left out."],
   });
 });
 
@@ -470,8 +475,45 @@ test("a drag takes a road user to a free start, and those that are selected with
   ]);
 });
 
+test("a drag that begins on a road user that is not selected moves the map, not the road user", () => {
+  const { handler } = using(null, scenario([car("a", FIRST)]));
+  expect(handler.grab(at(0, 0))).toBeNull();
+  const other = using(null, scenario([car("a", FIRST)]), { selection: ["b"] });
+  expect(other.handler.grab(at(0, 0))).toBeNull();
+});
+
+test("a road user that rules and criteria are about is removed with them or without, once that is said", () => {
+  const rule = {
+    id: "brake",
+    actor: "b",
+    when: { kind: "ttc", to: "a", below: 3 },
+    then: [{ kind: "stop" }],
+  };
+  const other = { ...rule, id: "else", when: { kind: "time", after: 3 } };
+  const document = {
+    ...scenario([car("a", FIRST), car("b", SECOND)]),
+    rules: [rule, other] as never,
+    criteria: ["min_ttc(a) >= 1.5 s", "collisions == 0"],
+  };
+  const { log } = using(null, document);
+  const { changes } = editing(document, log);
+  changes.remove(["a"]);
+  expect(log.edits).toEqual([]);
+  expect(log.asked).toEqual([{ ids: ["a"], uses: { rules: ["brake"], criteria: [0] } }]);
+  changes.remove(["a"], log.asked[0]?.uses);
+  changes.remove(["a"], { rules: [], criteria: [] });
+  expect(log.edits).toEqual([
+    [
+      { kind: "remove_actors", actors: ["a"] },
+      { kind: "remove_rule", rule: "brake" },
+      { kind: "set_criteria", criteria: ["collisions == 0"] },
+    ],
+    [{ kind: "remove_actors", actors: ["a"] }],
+  ]);
+});
+
 test("a road user that is dropped where none can start stays, and the reason is said", () => {
-  const { log, handler } = using(null, scenario([car("a", FIRST)]));
+  const { log, handler } = using(null, scenario([car("a", FIRST)]), { selection: ["a"] });
   handler.grab(at(0, 0))?.drop(at(900, 900));
   expect(log.edits).toEqual([]);
   expect(log.said).toHaveLength(1);
