@@ -126,7 +126,7 @@ def _map_readers(folder: Folder) -> dict[str, Reader]:
 def _run_readers(folder: Folder) -> dict[str, Reader]:
     from odscen.app.exchange.exports import export_run
     from odscen.app.running.reports import renew_report
-    from odscen.experiments.compare import compare
+    from odscen.experiments.comparisons import compare
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
 
@@ -155,7 +155,7 @@ def _run_readers(folder: Folder) -> dict[str, Reader]:
 def _interrupted_readers(folder: Folder) -> dict[str, Reader]:
     from odscen.app.exchange.exports import export_run
     from odscen.app.running.reports import renew_report
-    from odscen.experiments.compare import compare
+    from odscen.experiments.comparisons import compare
     from odscen.maps.store import Workspace
     from odscen.sumo.runner import long_runs
 

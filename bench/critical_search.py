@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.app.template_scenarios import template_scenario
-from odscen.experiments.search import SearchSettings, search
+from odscen.experiments.searches import SearchSettings, search
 from odscen.experiments.sweeps import SweepSettings
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps, loads

@@ -236,7 +236,7 @@ def _changes_of_steps(user: OdscenPage, take_back: Callable[[], object]) -> None
     add = page.get_by_role("button", name="Add the criterion")
     _timed(user, "criterion added", add.click, take_back)
 
-    opened("Run", ".step-body")
+    opened("Traffic lights", ".step-body")
     controls = itertools.cycle(("Actuated", "Fixed-time"))
     group = page.get_by_role("radiogroup", name="Signal control")
 

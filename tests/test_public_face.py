@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import odscen
+from tools.api_reference import reference_page
 
 ROOT = Path(__file__).parents[1]
 ERRORS = [name for name in odscen.__all__ if name.endswith("Error")]
@@ -55,6 +56,63 @@ def test_every_name_is_there_and_says_what_it_is(name: str) -> None:
     assert len(inspect.getdoc(found) or "") > 20
 
 
+MEMBERS = [
+    f"{module}.{name}"
+    for module in odscen.MODULES
+    for name in __import__(f"odscen.{module}", fromlist=["__all__"]).__all__
+]
+
+
+@pytest.mark.parametrize("path", MEMBERS)
+def test_every_name_of_a_public_module_is_there_and_says_what_it_is(path: str) -> None:
+    module, _, name = path.partition(".")
+    found = getattr(getattr(odscen, module), name)
+    assert found.__module__.startswith("odscen.")
+    assert len(inspect.getdoc(found) or "") > 10
+
+
+def test_public_modules_have_what_the_page_does() -> None:
+    """Sweep, search, dataset, test, study, template, demand, lights, learning, environments."""
+    wanted = {
+        "experiments.sweep", "experiments.search", "experiments.run_suite", "edit.Editing",
+        "experiments.run_experiment", "datasets.make_dataset", "templates.place_template",
+        "demand.import_traffic", "demand.sized", "signals.time_signals", "edit.add_actor",
+        "signals.evaluate_signals", "learn.GeneratorDoor", "learn.DrivingAction",
+        "rl.EgoEnvironment",
+    }  # fmt: skip
+    assert wanted <= set(MEMBERS)
+    assert set(odscen.MODULES) <= set(dir(odscen))
+
+
+def test_the_reference_is_that_of_the_sources() -> None:
+    """``python -m tools.api_reference`` writes it."""
+    written = (ROOT / "docs/api-reference.md").read_text(encoding="utf-8")
+    assert written == reference_page()
+
+
+@pytest.mark.slow
+def test_examples_of_the_documents_pass_a_strict_type_checker(tmp_path: Path) -> None:
+    """Those of the scenario format, and all scripts in ``examples/``."""
+    text = (ROOT / "docs/scenario-format.md").read_text(encoding="utf-8")
+    snippet = tmp_path / "scenario_format.py"
+    snippet.write_text(re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)[-1])
+    scripts = [str(file) for file in sorted((ROOT / "examples").rglob("*.py"))]
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--strict",
+        "--config-file=",
+        "--follow-imports=silent",
+    ]
+    options = ["--disable-error-code=import-untyped", "--cache-dir", str(tmp_path)]
+    done = subprocess.run(
+        [*command, *options, str(snippet), *scripts],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
 def test_an_unknown_name_is_an_attribute_error_as_of_any_module() -> None:
     with pytest.raises(AttributeError, match="module 'odscen' has no attribute 'runn'"):
         odscen.runn  # noqa: B018
@@ -63,7 +121,7 @@ def test_an_unknown_name_is_an_attribute_error_as_of_any_module() -> None:
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_every_function_tells_parameters_result_and_errors(name: str) -> None:
     function = getattr(odscen, name)
-    wanted = set() if name == "templates" else {"Raises"}  # which only lists what there is
+    wanted = {"Raises"}
     wanted |= {"Parameters"} if inspect.signature(function).parameters else set()
     wanted |= {"Yields"} if name == "watch" else {"Returns"}
     assert wanted <= sections(name)
@@ -88,7 +146,8 @@ def test_every_class_tells_its_fields(name: str) -> None:
     found = getattr(odscen, name)
     fields = is_dataclass(found) or hasattr(found, "model_fields") or hasattr(found, "_fields")
     fields = fields or inspect.isabstract(found) or issubclass(found, Enum)
-    assert ("Attributes" if fields else "Parameters") in sections(name)
+    if fields or inspect.signature(found).parameters:
+        assert ("Attributes" if fields else "Parameters") in sections(name)
     told = inspect.getdoc(found) or ""
     names = found.model_fields if hasattr(found, "model_fields") else getattr(found, "_fields", ())
     names = found.__dataclass_fields__ if is_dataclass(found) else names

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -82,6 +84,7 @@ def test_what_is_no_path_is_refused_in_words() -> None:
             r"an expectation must be made by odscen.parse_expectation\('arrived >= 50 %'\)",
         ),
         ({"expectations": "arrived >= 50 %"}, "expectations must be a tuple, not a single text"),
+        ({"seed": True}, "seed must be a whole number, not True"),
         ({"recording": "none"}, "recording must be an odscen.Recording, not 'none'"),
     ],
 )
@@ -91,6 +94,41 @@ def test_values_of_other_types_are_refused_where_they_are_given(
     """At construction, by name and value: not by an error of Python's in the middle of a run."""
     with pytest.raises(odscen.InputError, match=words):
         odscen.RunSettings(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (
+            {"columns": ("speedy",)},
+            r"columns must be a tuple of lane, pos, slope, not \('speedy',\)",
+        ),
+        ({"columns": "lane"}, "columns must be a tuple of lane, pos, slope, not 'lane'"),
+        ({"every": "1s"}, "every must be seconds above 0, not '1s'"),
+        ({"every": -1.0}, "every must be seconds above 0, not -1.0"),
+        ({"region": (0, 1)}, r"region must be four numbers, metres, not \(0, 1\)"),
+    ],
+)
+def test_what_is_recorded_is_checked_at_construction(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(odscen.InputError, match=words):
+        odscen.Recording(**wrong)
+
+
+def test_enumerations_are_refused_by_name_and_value(
+    workspace: odscen.Workspace, tmp_path: Path
+) -> None:
+    """A wrong kind of table, method of a search, count of scenarios: before anything is read."""
+    scenario = odscen.edit.new_scenario(workspace.map(MAP).graph(), name="empty")
+    with pytest.raises(odscen.InputError, match=r"kind must be one of od, .*, not 'matrix'"):
+        odscen.demand.import_demand(workspace, scenario, "none.csv", kind="matrix")  # type: ignore[arg-type]
+    with pytest.raises(odscen.InputError, match="method 'anneal' is not one of grid, latin"):
+        odscen.experiments.SearchSettings(method="anneal")
+    with pytest.raises(odscen.InputError, match="method grid takes no number of runs"):
+        odscen.experiments.SearchSettings(method="grid")
+    with pytest.raises(odscen.InputError, match="count must be a whole number, not '3'"):
+        odscen.GenerationSettings(count="3")  # type: ignore[arg-type]
+    with pytest.raises(odscen.InputError, match=r"a picture is a file \.svg or \.png"):
+        odscen.Picture("<svg/>").save(tmp_path / "map.jpg")
 
 
 def test_the_nearest_node_is_that_of_a_lane_in_the_direction(
@@ -111,6 +149,52 @@ def test_the_nearest_node_is_that_of_a_lane_in_the_direction(
         assert back.distance > 0.5
     with pytest.raises(odscen.InputError, match="finite"):
         entry.nearest(math.nan, 0.0)
+
+
+def test_maps_and_runs_are_pictures_with_units(
+    workspace: odscen.Workspace, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A script and a notebook get the same drawing; figures have units; a logger hears of it."""
+    entry = odscen.Workspace(str(workspace.root)).map(MAP)
+    file = entry.plot(segments=True).save(tmp_path / "map.svg")
+    drawn = file.read_text(encoding="utf-8")
+    assert ET.fromstring(drawn).tag.endswith("svg")
+    assert drawn.count("<path") > entry.plot().svg.count("<path")
+
+    settings = odscen.GenerationSettings(map_name=MAP, seed=3, fill=0.3)
+    scenario = odscen.read_scenario(odscen.generate(workspace, settings=settings)[0])
+    with caplog.at_level("INFO", logger="odscen"):
+        run = odscen.run(workspace, scenario, settings=odscen.RunSettings(until=30.0), name="drawn")
+    assert "run drawn: completed, 30 s simulated in" in caplog.text
+    bare, on_map = run.plot().svg, run.plot(entry).svg
+    assert ET.fromstring(bare).tag.endswith("svg")
+    assert on_map.count("<path") > bare.count("<path") + 5  # lanes and markings
+    assert 'class="cell v' in bare
+    size = dict(re.findall(r'(width|height)="(\d+)"', bare[:300]))
+    assert int(size["width"]) == 900
+    assert 100 < int(size["height"]) < 2000
+    table = run.figure_table()
+    (speed,) = table.filter(table["name"] == "mean_speed").iter_rows(named=True)
+    assert (speed["value"], speed["unit"]) == (run.figures["mean_speed"], "m/s")
+    assert set(run.figures) <= set(table["name"])
+    shown = run._repr_html_()
+    assert f"{run.figures['mean_speed']:.4g} m/s" in shown
+    assert shown.endswith("</svg>\n")
+
+
+def test_a_progress_bar_tells_of_each_run(
+    workspace: odscen.Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On standard error, so that what a script prints stays its own; it ends with the last run."""
+    settings = odscen.GenerationSettings(map_name=MAP, seed=5, count=2, fill=0.2)
+    files = odscen.generate(workspace, settings=settings)
+    short = odscen.RunSettings(until=10.0, recording=odscen.Recording(trajectories=False))
+    odscen.run_many(workspace, files, settings=short, reporter=odscen.ProgressBar(), reports=False)
+    odscen.run(workspace, files[0], settings=short, name="alone", reporter=odscen.ProgressBar())
+    said = capsys.readouterr()
+    assert said.out == ""
+    for name in (f"{MAP}-0005", f"{MAP}-0006", "run"):
+        assert re.search(rf"{name} .*100%", said.err), said.err
 
 
 def test_reprs_are_short(workspace: odscen.Workspace) -> None:

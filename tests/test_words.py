@@ -17,8 +17,8 @@ from typer.main import get_command
 
 from odscen.app.running import batches
 from odscen.cli.commands import command_line
-from odscen.experiments.compare import compare_runs, read_runs
 from odscen.experiments.comparison_page import comparison_page
+from odscen.experiments.comparisons import compare_runs, read_runs
 from odscen.maps.store import Workspace
 from odscen.records.outcomes import StopReason
 from odscen.runs.recording import Recording
@@ -111,7 +111,8 @@ def _helps(command: click.Command, name: str) -> Iterator[tuple[str, str]]:
 
 DOCUMENTS = sorted(
     {*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md"), ROOT / "maps" / "README.md"}
-    - {ROOT / "docs" / "glossary.md"},  # explains the terms in plain words
+    - {ROOT / "docs" / "glossary.md"}  # explains the terms in plain words
+    - {ROOT / "docs" / "api-reference.md"},  # is made of docstrings
 )
 
 

@@ -38,7 +38,6 @@ _PICTURE = re.compile(
     r'<picture>\s*<source[^>]*srcset="(?P<dark>[^"]+)">\s*'
     r'<img src="(?P<light>[^"]+)"(?P<more>[^>]*)>\s*</picture>'
 )
-_ROLE = re.compile(r":(?:class|func|meth|mod|data|attr|exc):<code>~?([^<]+)</code>")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -55,11 +54,6 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     """Lead links of the repository to the pages of the site, and pictures to its switch."""
     return switched_pictures(site_links(markdown, page.file.src_uri))
-
-
-def on_page_content(html: str, **_: object) -> str:
-    """Show what docstrings refer to by role (``:class:`X```) as code."""
-    return _ROLE.sub(lambda role: f"<code>{role[1].rpartition('.')[2]}</code>", html)
 
 
 def site_links(markdown: str, page: str) -> str:

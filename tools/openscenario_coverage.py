@@ -92,7 +92,6 @@ REMARKS: Final = {
     "ParameterCondition": ("approximated", "the declared value, and what actions set"),
     "VariableCondition": ("approximated", "the declared value, and what actions set"),
     "MiscObject": ("approximated", "a stationary car"),
-    "Dimensions": ("approximated", "the usual body of the category; the difference is said"),
     "DynamicConstraints": ("approximated", "`maxAcceleration` holds for braking too"),
     "VariableDeclaration": ("approximated", "the value is put in where it is named"),
     "ValueConstraint": ("approximated", "a least and a greatest value, both possible"),

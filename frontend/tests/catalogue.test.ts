@@ -6,7 +6,8 @@ import { arranged, type Wish } from "../src/catalogue/order";
 import { stepWords } from "../src/catalogue/steps";
 import { hashOf, parseAddress } from "../src/ui/address";
 import { roughLength } from "../src/language/units";
-import { clock, mapFacts, modelWord, networkFact } from "../src/ui/words";
+import { clock } from "../src/language/moments";
+import { mapFacts, modelWord, networkFact } from "../src/ui/words";
 import { mapInfo } from "./example";
 
 type Entry = ConversionReport["entries"][number];

@@ -23,6 +23,8 @@ export const actor = (id: string, spawn = "1.0.-1.0"): Actor => ({
   via: [],
   speed: null,
   lateral_offset: 0.5,
+  longitudinal_offset: 0,
+  size: null,
   depart: 0,
   initial_speed: null,
   style: "normal",

@@ -35,6 +35,19 @@ const shown = (time: number): Record<string, [number, number]> => {
   return found;
 };
 
+test("the recording ends with the story, and says where that was", () => {
+  const { times, first, ...rest } = columns();
+  const idle = { ...rest, times: [...times, 3, 4, 5], first: [...first, 4, 4, 4] };
+  const replay = new Replay(idle);
+  expect([replay.begin, replay.end, replay.spacing]).toEqual([0, 3, 1]);
+  expect(replay.extent()).toEqual([1_000_000, 5, 1_000_900, 7]);
+  expect(new Replay({ ...rest, times: [0, 5], first: [0, 0, 0], actor: [] }).end).toBe(5);
+  const many = Array.from({ length: 11 }, (_, n) =>
+    rest.actors.map((one) => ({ ...one, id: `${n} ${one.id}` })),
+  );
+  expect(new Replay({ ...columns(), actors: many.flat() }).extent()).toBeNull();
+});
+
 test("between two moments every road user is under way, far from zero too", () => {
   expect(shown(0.5)).toEqual({ "car-1": [1_000_005, 5] });
   expect(shown(-3)).toEqual({ "car-1": [1_000_000, 5] });

@@ -18,7 +18,8 @@ import { createEditorStore } from "../src/editor/store";
 import { fileGroups } from "../src/run/files";
 import { countMarks, countStations, worstFirst } from "../src/run/fit";
 import { BY_LENGTH } from "./example";
-import { bytes, hoursMinutes, longClock, span } from "../src/ui/words";
+import { longClock, span } from "../src/language/moments";
+import { bytes, hoursMinutes } from "../src/ui/words";
 
 const empty: Demand = {
   clock: 0,

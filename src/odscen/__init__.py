@@ -1,7 +1,8 @@
 """odscen: traffic scenarios on OpenDRIVE maps, run headlessly in SUMO.
 
 ``import odscen`` gives the public face and costs nothing: each name is imported when it is first
-used. Whatever is not in ``__all__`` may change.
+used, and so are the public modules, ``odscen.experiments``, ``.edit``, ``.templates``, ``.demand``,
+``.signals``, ``.datasets``, ``.learn`` and ``.rl``. Whatever is not in an ``__all__`` may change.
 
 >>> workspace = odscen.Workspace.open()
 >>> workspace.add_map(Path("Town01.xodr"))
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from odscen.app.signals.signal_optimisation import time_signals
     from odscen.app.signals.signal_plans import export_signals, import_signals, signal_programs
     from odscen.app.template_scenarios import template_scenario as place_template
-    from odscen.app.template_scenarios import templates
     from odscen.base.errors import (
         ConflictError,
         InputError,
@@ -52,7 +52,8 @@ if TYPE_CHECKING:
     )
     from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
     from odscen.convert.model.conversion_settings import ConversionSettings
-    from odscen.experiments.compare import RunComparison, compare
+    from odscen.drawing.map_sheet import Picture
+    from odscen.experiments.comparisons import RunComparison, compare
     from odscen.experiments.gates import run_suite
     from odscen.experiments.plan import StudyPlan as ExperimentPlan
     from odscen.experiments.studies import EndedStudy as ExperimentResults
@@ -71,6 +72,7 @@ if TYPE_CHECKING:
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
     from odscen.runs.recording import Recording
+    from odscen.runs.reporter import Progress, ProgressBar, Reporter
     from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
@@ -106,7 +108,6 @@ _HOMES = {
     "Format": "odscen.formats.base",
     "Editing": "odscen.app.editing",
     "SceneTemplate": "odscen.scenario.templates.scene_template",
-    "templates": "odscen.app.template_scenarios",
     "place_template": "odscen.app.template_scenarios:template_scenario",
     "import_demand": "odscen.app.demand.demands",
     "add_background": "odscen.app.demand.demands",
@@ -139,10 +140,14 @@ _HOMES = {
     "watch": "odscen.app.running.watched_runs",
     "WatchedRun": "odscen.app.running.watched_runs",
     "Step": "odscen.sumo.runner.in_step",
+    "Reporter": "odscen.runs.reporter",
+    "Progress": "odscen.runs.reporter",
+    "ProgressBar": "odscen.runs.reporter",
     "Run": "odscen.runs.finished_run",
+    "Picture": "odscen.drawing.map_sheet",
     "renew_report": "odscen.app.running.reports",
-    "compare": "odscen.experiments.compare",
-    "RunComparison": "odscen.experiments.compare",
+    "compare": "odscen.experiments.comparisons",
+    "RunComparison": "odscen.experiments.comparisons",
     "ExperimentPlan": "odscen.experiments.plan:StudyPlan",
     "ExperimentResults": "odscen.experiments.studies:EndedStudy",
     "run_experiment": "odscen.experiments.studies",
@@ -163,6 +168,18 @@ _HOMES = {
 
 ``tests/test_public_face.py`` holds it against the imports above.
 """
+
+MODULES = (
+    "datasets",
+    "demand",
+    "edit",
+    "experiments",
+    "learn",
+    "rl",
+    "signals",
+    "templates",
+)
+"""Public modules."""
 
 __all__ = [
     "ActionKind",
@@ -187,11 +204,15 @@ __all__ = [
     "NearestNode",
     "NotFoundError",
     "OdscenError",
+    "Picture",
     "Problem",
+    "Progress",
+    "ProgressBar",
     "Reading",
     "RecordedTraffic",
     "Recording",
     "ReportEntry",
+    "Reporter",
     "Run",
     "RunComparison",
     "RunSettings",
@@ -236,7 +257,6 @@ __all__ = [
     "scenario_from_arrays",
     "shipped_maps",
     "signal_programs",
-    "templates",
     "time_signals",
     "watch",
     "whole_day",
@@ -246,6 +266,8 @@ __all__ = [
 if not TYPE_CHECKING:  # a type checker knows the names from the imports above, and no others
 
     def __getattr__(name: str) -> object:
+        if name in MODULES:
+            return import_module(f"odscen.{name}")
         if name not in _HOMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         module, _, own = _HOMES[name].partition(":")
@@ -254,4 +276,4 @@ if not TYPE_CHECKING:  # a type checker knows the names from the imports above, 
         return value
 
     def __dir__() -> list[str]:
-        return sorted({*globals(), *__all__})
+        return sorted({*globals(), *__all__, *MODULES})

@@ -13,7 +13,7 @@ from odscen.app.running.reports import renew_report
 from odscen.app.running.resumed_runs import resume
 from odscen.app.running.runs import carry_out, check_file, prepare_run
 from odscen.base.errors import DamagedError, InputError
-from odscen.experiments.compare import compare
+from odscen.experiments.comparisons import compare
 from odscen.maps.store import Workspace
 from odscen.runs.reporter import Progress
 from odscen.runs.run_settings import RunSettings

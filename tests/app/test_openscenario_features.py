@@ -308,8 +308,8 @@ def test_who_follows_a_trajectory_meets_the_ego_on_it(
     rows = {str(key): one for (key,), one in done.trajectories().group_by("id")}
     other = rows["VRU"].filter(rows["VRU"]["time"] > 0.15)
     passes = float(np.interp(-1.75, other["y"], other["time"]))
-    # ... when the axle of the ego, on node 25 at first, would come to s = 116 m at 10 m/s
-    assert passes == pytest.approx((116 - (51 - 1.4)) / 10, abs=0.05)
+    # ... when the axle of the ego, at s = 48.6 m at first, would come to s = 116 m at 10 m/s
+    assert passes == pytest.approx((116 - 48.6) / 10, abs=0.05)
     assert other["x"].to_numpy() == pytest.approx(np.full(other.height, 120.0), abs=0.05)
     assert other["y"][-1] > -1.75 + 0.3  # and goes on
 

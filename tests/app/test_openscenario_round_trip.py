@@ -20,7 +20,7 @@ from odscen.formats.openscenario.dialect import VERSIONS
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.document.scenario_document import Environment
 from odscen.scenario.sampling.generation_settings import GenerationSettings
-from tests.sumo.story_case import document, entry, node_at, workspace
+from tests.sumo.story_case import MIDDLE, document, entry, node_at, workspace
 
 if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
@@ -92,13 +92,32 @@ def test_a_template_comes_back_but_for_what_the_export_lists(
         assert [one.id for one in after.rules] == [one.id for one in before.rules]
 
 
-@pytest.mark.parametrize("template", ["cut-in", "bus-leaves"])
+@pytest.mark.parametrize("template", ["cut-in", "bus-leaves", "lead-brakes"])
 def test_a_scene_that_openscenario_can_say_comes_back_whole(template: str, tmp_path: Path) -> None:
     entry(PLACES[template])
     before = template_scenario(workspace(), template, PLACES[template])
     after, notes = there_and_back(before, tmp_path, "1.2")
     assert notes == {"approximated": [], "left_out": []}
     assert acting_differences(before, after) == ()
+
+
+def test_bodies_exact_starts_and_headways_ahead_come_back(tmp_path: Path) -> None:
+    entry("motorway_weave")
+    ego, van = (node_at("motorway_weave", x, MIDDLE) for x in (300.0, 340.0))
+    actors = [
+        {"id": "ego", "category": "car", "spawn": ego, "goal": None, "driver": "story",
+         "size": {"length": 4.2, "width": 1.75}, "longitudinal_offset": 0.7, "ego": True},
+        {"id": "van", "category": "van", "spawn": van, "goal": None, "driver": "story",
+         "longitudinal_offset": -0.4, "lateral_offset": 0.5},
+    ]  # fmt: skip
+    when = {"headway": {"of": "ego", "to": "van", "above": 2.0, "ahead": True, "free": False}}
+    rules = [{"id": "r", "actor": "van", "when": when, "then": [{"brake": {"by": 3.0}}]}]
+    before = document("motorway_weave", actors, rules)
+    after, _ = there_and_back(before, tmp_path, "1.2")
+    assert [(one.size, one.longitudinal_offset, one.lateral_offset) for one in after.actors] == [
+        (one.size, one.longitudinal_offset, one.lateral_offset) for one in before.actors
+    ]
+    assert after.rules[0].when == before.rules[0].when
 
 
 @pytest.mark.slow

@@ -88,6 +88,10 @@ def test_a_cut_in_becomes_rules_with_its_numbers(workspace: Workspace, tmp_path:
     ego, other = scenario.actors
     assert (ego.spawn, ego.initial_speed, ego.ego) == ("0.0.-1.25", 10.0, True)
     assert (other.spawn, str(other.category)) == ("0.0.-2.44", "van")
+    assert ego.size is not None
+    assert (ego.size.length, ego.size.width, ego.size.height, other.size) == (5.0, 1.8, 1.5, None)
+    # Nodes are at odd metres: the centre 1.4 m ahead of 48.6 m, and 40 m on from there.
+    assert (ego.longitudinal_offset, other.longitudinal_offset) == (-1.0, -0.4)
     assert scenario.simulation.duration == 20
     headway, change = rules["cut-in"].when, rules["cut-in"].then[0].lane
     assert headway.headway is not None
@@ -244,10 +248,9 @@ def test_a_pedestrian_is_on_wheels_where_there_is_nothing_to_walk_on(
     found = import_file(workspace, file)
     _, other = found.scenario.actors
     assert (str(other.category), other.spawn) == ("motorcycle", "0.0.-2.44")
-    assert (
-        "a motorcycle, 2.2 m long and 0.9 m wide in the place of 0.2 m and 0.5 m: "
-        "the map has nothing to walk on" in {row.reason for row in found.lists["approximated"]}
-    )
+    assert "a motorcycle of its size: the map has nothing to walk on" in {
+        row.reason for row in found.lists["approximated"]
+    }
     assert [one for one in found.problems if one.severity == "error"] == []
 
 

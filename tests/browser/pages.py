@@ -229,6 +229,16 @@ class OdscenPage:
             .first
         )
 
+    def open_first_light(self) -> None:
+        """Open the program of the first junction with a traffic light."""
+        self.step("Traffic lights").click()
+        self.first_light.click()
+
+    @property
+    def first_light(self) -> Locator:
+        lights = self.page.get_by_role("group", name="Junctions with a traffic light")
+        return lights.get_by_role("button").first
+
     @property
     def region_note(self) -> Locator:
         return self.step("Region")

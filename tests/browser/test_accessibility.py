@@ -16,8 +16,8 @@ from playwright.sync_api import Page, expect
 
 from odscen.app.running import batches
 from odscen.app.scenarios import SUFFIX, generate
-from odscen.experiments.compare import compare_runs, read_runs
 from odscen.experiments.comparison_page import comparison_page
+from odscen.experiments.comparisons import compare_runs, read_runs
 from odscen.experiments.plan import StudyPlan, StudyRuns, StudyVariant
 from odscen.experiments.studies import begin_study_of, carry_out_study
 from odscen.experiments.work import LocalExecutor
@@ -187,7 +187,15 @@ def test_the_editor(visit: Callable[..., Any], served: tool.Served, sampled: str
     user.wait_for_editor()
     inspector.look("editor-new")
     user.open_editor(sampled)
-    for step in ("Map", "Region", "Weather and time", "Road users", "Traffic", "Run"):
+    for step in (
+        "Map",
+        "Region",
+        "Weather and time",
+        "Road users",
+        "Demand",
+        "Traffic lights",
+        "Run",
+    ):
         user.step(step).click()
         inspector.look("editor-" + step.lower().replace(" ", "-"))
     user.step("Weather and time").click()
@@ -238,7 +246,7 @@ def test_measures_and_public_transport(
 def test_the_study(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)
-    user.step("Study").click()
+    user.step("Analysis").click()
     user.choose("Kind of station", "Travel-time section")
     user.page.get_by_role("button", name="Choose it on the map").click()
     user.map.click(user.graph.middle("r2"))
@@ -292,7 +300,7 @@ def test_traffic_and_counts(
 ) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)
-    user.step("Traffic").click()
+    user.step("Demand").click()
     with user.changing():
         user.page.get_by_role("button", name="Add background traffic").click()
     user.choose("Day profile", "Weekday")
@@ -335,7 +343,7 @@ def test_traffic_and_counts(
 def test_a_long_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_editor(sampled)
-    user.step("Traffic").click()
+    user.step("Demand").click()
     with user.changing():
         user.page.get_by_role("button", name="Add background traffic").click()
     user.step("Run").click()
@@ -390,8 +398,7 @@ def test_the_run(visit: Callable[..., Any], served: tool.Served, sampled: str) -
     inspector.look("run-lights")
     user.page.get_by_role("button", name="Back to the editor").last.click()
     user.wait_for_editor()
-    user.step("Run").click()
-    user.page.get_by_role("button", name="Show the signal programs").click()
+    user.open_first_light()
     expect(user.page.get_by_role("heading", name="Stages")).to_be_visible()
     inspector.look("editor-light")
 

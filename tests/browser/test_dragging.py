@@ -47,6 +47,12 @@ def test_a_road_user_is_dragged_to_the_nearest_free_start_and_undo_brings_it_bac
 ) -> None:
     before = cars.document()
     target = cars.graph.starts(before["roi"], 8, apart=20)[7]
+    view = cars.map.view()
+    cars.map.drag(where(cars, 0), target)  # not selected: the map is moved
+    assert cars.map.view() != view
+    assert cars.document() == before
+    cars.map.area.press("0")
+    cars.map.click(where(cars, 0))
     with cars.changing():
         cars.map.drag(where(cars, 0), target)
     assert away(where(cars, 0), target) < 3

@@ -107,7 +107,8 @@ def test_roads_and_road_users_are_found_by_name_without_a_mouse(region: OdscenPa
     for searched, kind in ((road, "Road"), (name, "Bus")):
         keyboard.press("Escape")
         keyboard.press("Control+k")
-        region.page.get_by_role("combobox", name="Name").fill(f"{kind.lower()} {searched}")
+        field = region.page.get_by_role("combobox", name="Name of a place")
+        field.fill(f"{kind.lower()} {searched}")
         expect(region.page.get_by_role("option").first).to_contain_text(searched)
         keyboard.press("Enter")
         expect(region.page.get_by_role("dialog")).to_have_count(0)

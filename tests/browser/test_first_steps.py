@@ -126,7 +126,7 @@ def test_a_change_that_takes_long_is_said_on_the_map(region: OdscenPage) -> None
 def test_without_a_clock_no_time_of_day_is_shown_that_the_weather_contradicts(
     region: OdscenPage,
 ) -> None:
-    region.step("Traffic").click()
+    region.step("Demand").click()
     field = region.page.get_by_role("textbox", name="Time of day at the start")
     expect(field).to_have_value("")
     with region.changing():

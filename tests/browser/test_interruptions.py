@@ -152,8 +152,7 @@ class NameMeasure(Work):
 
 class LengthenGreen(Work):
     def begin(self, user: OdscenPage) -> None:
-        user.step("Run").click()
-        user.page.get_by_role("button", name="Show the signal programs").click()
+        user.open_first_light()
         light = user.page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
         green = light.get_by_role("slider", name="Green of stage 1")
         expect(green).to_be_visible()
@@ -241,7 +240,7 @@ def test_a_second_window_that_changes_the_scenario_takes_nothing_away(
     work.begin(editor)
     other = open_page(line.url, context=editor.page.context)
     other.open_editor(editor.scenario)
-    other.step("Traffic").click()
+    other.step("Demand").click()
     with other.changing():
         other.page.get_by_role("button", name="Add background traffic").click()
     work.finish(editor)

@@ -115,7 +115,7 @@ def test_a_speed_in_miles_and_a_length_in_feet_are_metres_and_seconds_in_the_doc
     assert next(one for one in after["actors"] if one["id"] == name) == actor
     expect(page.locator(".map-scale")).to_contain_text("ft")
 
-    user.step("Traffic").click()
+    user.step("Demand").click()
     clock = page.get_by_role("textbox", name="Time of day at the start")
     with user.changing():
         clock.fill("5:15 pm")

@@ -73,8 +73,8 @@ def close_a_lane(user: OdscenPage, hand: Hand, lane: str) -> None:
 
 
 def lengthen_a_green(user: OdscenPage, hand: Hand) -> None:
-    opened(user, hand, "Run")
-    hand.press(user.page.get_by_role("button", name="Show the signal programs"))
+    opened(user, hand, "Traffic lights")
+    hand.press(user.first_light)
     light = user.page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
     green, cycle = (light.get_by_role("slider", name=n) for n in ("Green of stage 1", "Cycle"))
     before = float((green.get_attribute("aria-valuetext") or "").split()[0])

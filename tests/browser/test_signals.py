@@ -34,8 +34,7 @@ def test_a_click_on_a_signal_shows_its_program_and_a_run_where_it_is_in_its_cycl
 ) -> None:
     page = user.page
     user.open_editor(saved(served))
-    user.step("Run").click()
-    page.get_by_role("button", name="Show the signal programs").click()
+    user.open_first_light()
     light = page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
     expect(light).to_be_focused()
     expect(light.get_by_role("img", name=re.compile("^stage "))).to_have_count(4)
@@ -49,6 +48,7 @@ def test_a_click_on_a_signal_shows_its_program_and_a_run_where_it_is_in_its_cycl
     expect(light).to_be_visible()
     light.get_by_role("button", name="Close the traffic light").click()
 
+    user.step("Run").click()
     user.choose_pace("As fast as possible")
     user.run.click()
     expect(user.result).to_contain_text("finished")
@@ -70,8 +70,7 @@ def test_a_click_on_a_signal_shows_its_program_and_a_run_where_it_is_in_its_cycl
 def open_program(user: OdscenPage, scenario: str) -> Locator:
     """Open the program of the crossing's light in the editor."""
     user.open_editor(scenario)
-    user.step("Run").click()
-    user.page.get_by_role("button", name="Show the signal programs").click()
+    user.open_first_light()
     light = user.page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
     expect(light.get_by_role("slider", name="Cycle")).to_be_visible()
     return light
@@ -122,6 +121,7 @@ def test_a_green_is_made_longer_by_mouse_and_by_keyboard_run_and_undone(
     page.get_by_role("button", name="Close this message").click()
     light.get_by_role("button", name="Close the traffic light").click()
 
+    user.step("Run").click()
     user.choose_pace("As fast as possible")
     user.run.click()
     expect(user.result).to_contain_text("finished")

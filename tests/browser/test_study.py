@@ -16,7 +16,7 @@ __all__ = ["crossing"]
 def test_stations_are_placed_changed_removed_and_taken_back_with_the_mouse(
     user: OdscenPage, crossing: str
 ) -> None:
-    opened(user, crossing, "Study")
+    opened(user, crossing, "Analysis")
     new = card(user, "New station")
     first, second = (on_lane(user, outer_lane(user, road)) for road in ("r2", "r3"))
     new.get_by_role("button", name="Choose it on the map").click()
@@ -60,7 +60,7 @@ def test_times_and_a_cordon_are_set_with_the_keyboard_alone(
 ) -> None:
     user.open_editor(crossing)
     keyboard = user.page.keyboard
-    press(user, user.step("Study"))
+    press(user, user.step("Analysis"))
     user.tab_to(user.page.get_by_label("Warm-up that figures leave out"))
     keyboard.press("Control+A")
     keyboard.type("10")
@@ -109,7 +109,7 @@ def test_times_and_a_cordon_are_set_with_the_keyboard_alone(
 def test_a_station_where_there_is_no_lane_is_refused_with_the_name_of_the_node(
     user: OdscenPage, crossing: str
 ) -> None:
-    opened(user, crossing, "Study")
+    opened(user, crossing, "Analysis")
     user.page.get_by_label("or type the node", exact=True).fill("77.0.-1.1")
     user.page.keyboard.press("Enter")
     expect(user.refusal).to_contain_text("the map has no node '77.0.-1.1'")

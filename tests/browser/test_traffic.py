@@ -38,7 +38,7 @@ def _write(workspace: Workspace, name: str, scenario: Any) -> None:
 
 def open_traffic(user: OdscenPage, scenario: str) -> None:
     user.open_editor(scenario)
-    user.step("Traffic").click()
+    user.step("Demand").click()
 
 
 def send_table(user: OdscenPage, kind: str, path: Path) -> None:
@@ -93,7 +93,7 @@ def test_background_traffic_is_added_changed_and_taken_back(
     with user.changing():
         user.page.get_by_label("Time of day at the start").fill("07:30")
         user.page.keyboard.press("Enter")
-    for label, minutes in (("From", "5"), ("Until", "20")):
+    for label, minutes in (("From", "07:35"), ("Until", "07:50")):
         with user.changing():
             background(user).get_by_label(label, exact=True).fill(minutes)
             user.page.keyboard.press("Enter")

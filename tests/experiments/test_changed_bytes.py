@@ -11,7 +11,7 @@ from odscen.app.exchange.exports import export_run
 from odscen.app.running.reports import renew_report
 from odscen.app.running.runs import run
 from odscen.base.errors import InputError
-from odscen.experiments.compare import compare
+from odscen.experiments.comparisons import compare
 from odscen.experiments.datasets import make_dataset
 from odscen.experiments.measure import FigureKey
 from odscen.experiments.studies import (

@@ -7,8 +7,8 @@ from scipy import stats
 
 from odscen.app.running import runs
 from odscen.base.errors import InputError
-from odscen.experiments.compare import compare_runs, read_runs
 from odscen.experiments.comparison_page import comparison_page
+from odscen.experiments.comparisons import compare_runs, read_runs
 from odscen.experiments.measure import FigureKey
 from odscen.figures.measures.comparison import compare_figure
 from odscen.maps.store import Workspace

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from odscen.experiments.search import distinct, pair_coverage
+from odscen.experiments.searches import distinct, pair_coverage
 
 
 def test_of_cases_that_are_alike_the_worst_is_kept() -> None:

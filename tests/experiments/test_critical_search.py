@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from odscen.base.errors import ConflictError, InputError
-from odscen.experiments.search import SearchSettings, search
+from odscen.experiments.searches import SearchSettings, search
 from odscen.experiments.sweeps import SweepSettings
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.sweeps.sweep_plan import Range
@@ -19,7 +19,7 @@ from tests.sumo.story_case import MIDDLE, document, node_at, workspace
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from odscen.experiments.search import SearchResult
+    from odscen.experiments.searches import SearchResult
     from odscen.scenario.document.scenario_document import Scenario
 
 MOTORWAY = "motorway_weave"

@@ -10,7 +10,7 @@ import pytest
 from odscen.base.errors import ScenarioError
 from odscen.experiments.datasets import DatasetPlan
 from odscen.experiments.plan import StudyPlan
-from odscen.experiments.search import SearchSettings, search
+from odscen.experiments.searches import SearchSettings, search
 from odscen.experiments.studies import begin_study, carry_out_study
 from odscen.experiments.suite import read_suite
 from odscen.experiments.sweeps import SweepSettings, sweep

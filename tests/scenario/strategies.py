@@ -9,6 +9,7 @@ from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.document.scenario_document import (
     Actor,
     Background,
+    BodySize,
     Counts,
     Demand,
     Environment,
@@ -36,6 +37,8 @@ actors = st.builds(
     via=st.lists(labels, max_size=3).map(tuple),
     speed=st.none() | st.floats(0, 100, exclude_min=True),
     lateral_offset=st.floats(-10, 10),
+    longitudinal_offset=st.floats(-10, 10),
+    size=st.none() | st.builds(BodySize, length=st.floats(0.1, 30), width=st.floats(0.1, 5)),
     depart=st.floats(0, 1e6),
     initial_speed=st.none() | st.floats(0, 100),
     style=st.sampled_from(["cautious", "normal", "sporty"]),

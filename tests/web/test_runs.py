@@ -353,6 +353,23 @@ def test_runs_of_a_changed_scenario_can_be_told_apart(client: TestClient, sample
 
 
 @pytest.mark.slow
+def test_a_run_says_at_which_time_of_day_it_began_when_the_scenario_has_another_since(
+    client: TestClient, sampled: str
+) -> None:
+    def begin_at(clock: float) -> None:
+        version = client.get(f"/api/scenarios/{sampled}").json()["version"]
+        wish = {"version": version, "edits": [{"kind": "set_clock", "clock": clock}]}
+        assert client.post(f"/api/scenarios/{sampled}/edits", json=wish).status_code == 200
+
+    begin_at(35_100)
+    run = start(client, sampled, until=2)
+    assert client.get(f"/api/runs/{run}").json()["clock"] == 35_100
+    finished(client, run)
+    begin_at(0)
+    assert client.get(f"/api/runs/{run}/content").json()["clock"] == 35_100
+
+
+@pytest.mark.slow
 def test_a_run_whose_preparation_fails_can_be_removed(
     client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -22,7 +22,7 @@ def demand(studio: Studio) -> None:
     with studio.visit() as camera:
         user, page = camera.user, camera.user.page
         user.open_editor(scenarios.INFLOW)
-        user.step("Traffic").click()
+        user.step("Demand").click()
         card = page.get_by_role("region", name="Vehicles from outside west", exact=True)
         card.get_by_role("button", name="Change the mix").click()
         card.evaluate(TO_TOP)
@@ -131,9 +131,8 @@ def _program(camera: Camera) -> Locator:
     """Open the program of the light of the crossing."""
     user, page = camera.user, camera.user.page
     user.open_editor(scenarios.LIT)
-    user.step("Run").click()
     page.get_by_role("button", name="Hide the table").click()
-    page.get_by_role("button", name="Show the signal programs").click()
+    user.open_first_light()
     light = page.get_by_role("region", name="Traffic light of junction")
     expect(light.get_by_role("slider", name="Cycle")).to_be_visible()
     return light

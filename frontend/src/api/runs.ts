@@ -10,6 +10,7 @@ export type RunState = RunInfo["state"];
 export type RunWish = Schemas["NewRun"];
 /** Bytes, and road users. */
 export type Forecast = Schemas["RunForecast"];
+export type RunContent = Schemas["RunContent"];
 export type RunFile = Schemas["RunFile"];
 /** One count of vehicles and what a run made of it; seconds and metres. */
 export type FitRow = Schemas["FitRow"];

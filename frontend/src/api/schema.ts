@@ -793,8 +793,10 @@ export interface components {
          *     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
          *     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
          *     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-         *     positive to the left of the driving direction. ``style`` is a driving style or the id of a
-         *     driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+         *     positive to the left of the driving direction, ``longitudinal_offset`` in it: metres from the
+         *     node to the centre of the body. ``size`` is that of its body; ``None`` is that of its model, or
+         *     the usual one of its category. ``style`` is a driving style or the id of a driver set of the
+         *     scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
          *     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
          *     their order; an open goal is one that can be reached from the last of them. ``driver`` is who
          *     drives a vehicle that no rule moves: SUMO, or the ``story`` alone, which keeps its initial speed
@@ -811,6 +813,9 @@ export interface components {
             speed: number | null;
             /** @default 0 */
             lateral_offset: number;
+            /** @default 0 */
+            longitudinal_offset: number;
+            size: components["schemas"]["BodySize-Output"] | null;
             /** @default 0 */
             depart: number;
             initial_speed: number | null;
@@ -858,6 +863,8 @@ export interface components {
             via?: string[];
             speed?: number | null;
             lateral_offset?: number;
+            longitudinal_offset?: number;
+            size?: components["schemas"]["BodySize-Input"] | null;
             depart?: number;
             initial_speed?: number | null;
             style?: string;
@@ -1095,6 +1102,18 @@ export interface components {
             width: number;
             height: number;
         };
+        /** @description Bounding box of a road user, metres; without a height it has that of its category. */
+        "BodySize-Input": {
+            length: number;
+            width: number;
+            height?: number | null;
+        };
+        /** @description Bounding box of a road user, metres; without a height it has that of its category. */
+        "BodySize-Output": {
+            length: number;
+            width: number;
+            height: number | null;
+        };
         Body_add_map_api_maps_post: {
             /** @description A map of any format of `/map-importers`. */
             file: string;
@@ -1191,6 +1210,8 @@ export interface components {
             via?: string[];
             speed?: number | null;
             lateral_offset?: number;
+            longitudinal_offset?: number;
+            size?: components["schemas"]["BodySize-Input"] | null;
             depart?: number;
             initial_speed?: number | null;
             style?: string;
@@ -1313,8 +1334,8 @@ export interface components {
          */
         "Condition-Input": {
             time?: components["schemas"]["AfterTime"] | null;
-            ttc?: components["schemas"]["PairBounded-Input"] | null;
-            headway?: components["schemas"]["PairBounded-Input"] | null;
+            ttc?: components["schemas"]["SecondsBetween-Input"] | null;
+            headway?: components["schemas"]["SecondsBetween-Input"] | null;
             distance?: components["schemas"]["DistanceBounded-Input"] | null;
             relative_speed?: components["schemas"]["PairBounded-Input"] | null;
             speed?: components["schemas"]["OwnBounded-Input"] | null;
@@ -1347,8 +1368,8 @@ export interface components {
          */
         "Condition-Output": {
             time: components["schemas"]["AfterTime"] | null;
-            ttc: components["schemas"]["PairBounded-Output"] | null;
-            headway: components["schemas"]["PairBounded-Output"] | null;
+            ttc: components["schemas"]["SecondsBetween-Output"] | null;
+            headway: components["schemas"]["SecondsBetween-Output"] | null;
             distance: components["schemas"]["DistanceBounded-Output"] | null;
             relative_speed: components["schemas"]["PairBounded-Output"] | null;
             speed: components["schemas"]["OwnBounded-Output"] | null;
@@ -2522,6 +2543,21 @@ export interface components {
             /** @default 5 */
             length: number;
         };
+        /** @description Give the lane, its direction or all lanes of the section there a limit, km/h. */
+        LaneLimit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            limit: number;
+            /**
+             * @default direction
+             * @enum {string}
+             */
+            lanes?: "lane" | "direction" | "road";
+        };
         /** @description Give a lane a width, metres, but for a taper at both ends of its section. */
         LaneWidth: {
             at: components["schemas"]["MapPlace"];
@@ -2626,12 +2662,12 @@ export interface components {
         };
         /** @description All edits of a map, in place of those that it has; ``out`` is the map that gets them. */
         MapEdits: {
-            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["odscen__maps__map_edits__SpeedLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
+            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
             out?: string | null;
         };
         /** @description Edits of a map in their order, and what became of each; the row of edit n has number n. */
         MapEditsInfo: {
-            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["odscen__maps__map_edits__SpeedLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
+            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
             rows: components["schemas"]["ConversionEntry"][];
         };
         /** @description The map's version of OpenDRIVE, and on which side is driven: RHT, LHT or mixed. */
@@ -3071,9 +3107,10 @@ export interface components {
             words: string;
         };
         /**
-         * @description What is at a place of a map: its lane, with outline, and what is near it.
+         * @description What is at a place of a map: its lane, and what is near it.
          *
-         *     Width in metres, limit in km/h, direction of driving in rad.
+         *     Width in metres, limit in km/h, direction of driving in rad; ``ring`` is the outline of the
+         *     lane, x and y in turn.
          */
         PlaceInfo: {
             road: string;
@@ -3081,10 +3118,7 @@ export interface components {
             width: number;
             limit: number | null;
             hdg: number;
-            ring: [
-                number,
-                number
-            ][];
+            ring: number[];
             parts: ("stop_line" | "crosswalk" | "light" | "sign")[];
         };
         /**
@@ -3588,11 +3622,14 @@ export interface components {
         /**
          * @description ``digest`` is the same where scenarios differ at most in name and description.
          *
-         *     ``counts`` is how many counts of vehicles the scenario has.
+         *     ``counts`` is how many counts of vehicles the scenario has, ``clock`` the time of day at the
+         *     start, seconds, 0 without one.
          */
         RunContent: {
             digest: string;
             counts: number;
+            /** @default 0 */
+            clock: number;
         };
         /**
          * @description Steer a run. ``speed`` (with action ``speed``) as in :class:`NewRun`.
@@ -3662,7 +3699,8 @@ export interface components {
          *     ``finished`` is when its results were written, in seconds since 1970. ``preparing`` says how far
          *     routes by travel time have been found before it begins. ``carla`` says that it is
          *     shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
-         *     ``slices``; one that is ``interrupted`` can go on from the last of them.
+         *     ``slices``; one that is ``interrupted`` can go on from the last of them. ``clock`` is the time
+         *     of day at the start, seconds, while the server still has the scenario (see ``RunContent``).
          */
         RunInfo: {
             run: string;
@@ -3679,6 +3717,7 @@ export interface components {
             carla: boolean;
             slices: components["schemas"]["RunSlices"] | null;
             preparing: string | null;
+            clock: number | null;
         };
         /**
          * @description What vehicles did on each lane in each interval of a run.
@@ -3881,7 +3920,7 @@ export interface components {
              */
             signals: components["schemas"]["Signals"];
             /** @default [] */
-            measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["odscen__scenario__document__measures_document__SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
+            measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
             /**
              * @default {
              *       "duration": 600,
@@ -3954,6 +3993,36 @@ export interface components {
             label: string;
             undo: string | null;
             redo: string | null;
+        };
+        /**
+         * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
+         *
+         *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         */
+        "SecondsBetween-Input": {
+            below?: number | null;
+            above?: number | null;
+            of?: string | null;
+            to: string;
+            /** @default true */
+            free?: boolean;
+            /** @default false */
+            ahead?: boolean;
+        };
+        /**
+         * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
+         *
+         *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         */
+        "SecondsBetween-Output": {
+            below: number | null;
+            above: number | null;
+            of: string | null;
+            to: string;
+            /** @default true */
+            free: boolean;
+            /** @default false */
+            ahead: boolean;
         };
         /** @description A segment and its neighbours, which are rows. */
         SegmentInfo: {
@@ -4271,7 +4340,7 @@ export interface components {
              * @enum {string}
              */
             kind: "set_measure";
-            measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["odscen__scenario__document__measures_document__SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
+            measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
             instead_of?: string | null;
         };
         /** @description Let the program of a light begin so many seconds into the scenario. */
@@ -4776,6 +4845,34 @@ export interface components {
             rate: number | null;
             over: number | null;
             within: number | null;
+        };
+        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
+        "SpeedLimit-Input": {
+            id: string;
+            /** @default 0 */
+            begin?: number;
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            places: string[];
+            speed: number;
+        };
+        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
+        "SpeedLimit-Output": {
+            id: string;
+            /** @default 0 */
+            begin: number;
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            places: string[];
+            speed: number;
         };
         /**
          * @description A stage in the cycle of a plan; seconds.
@@ -5466,49 +5563,6 @@ export interface components {
         Zone: {
             id: string;
             segments: string[];
-        };
-        /** @description Give the lane, its direction or all lanes of the section there a limit, km/h. */
-        odscen__maps__map_edits__SpeedLimit: {
-            at: components["schemas"]["MapPlace"];
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            limit: number;
-            /**
-             * @default direction
-             * @enum {string}
-             */
-            lanes?: "lane" | "direction" | "road";
-        };
-        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
-        "odscen__scenario__document__measures_document__SpeedLimit-Input": {
-            id: string;
-            /** @default 0 */
-            begin?: number;
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            places: string[];
-            speed: number;
-        };
-        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
-        "odscen__scenario__document__measures_document__SpeedLimit-Output": {
-            id: string;
-            /** @default 0 */
-            begin: number;
-            end: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            places: string[];
-            speed: number;
         };
         /** @description A road user that will ever be in a frame, and the row by which frames name them; metres. */
         LiveActor: {

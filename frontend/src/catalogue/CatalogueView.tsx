@@ -67,6 +67,15 @@ export function CatalogueView() {
   };
   const all = maps.value ?? [];
   const found = arranged(all, search, order, wishes);
+  const own = scenarios.value ?? [];
+  // Who has begun something comes back for that.
+  const mine = (
+    <Scenarios
+      list={own}
+      importing={importing}
+      onRemove={(name) => setRemoving({ kind: "scenario", name })}
+    />
+  );
 
   return (
     <div
@@ -81,7 +90,8 @@ export function CatalogueView() {
       }}
       onDrop={dropped}
     >
-      <Title order={1} size="h2">
+      {own.length > 0 && mine}
+      <Title order={own.length > 0 ? 2 : 1} size={own.length > 0 ? "h3" : "h2"} mt={own.length > 0 ? 34 : 0}>
         <Trans>Choose a map</Trans>
       </Title>
       <Text c="dimmed">
@@ -180,11 +190,7 @@ export function CatalogueView() {
         </div>
       )}
       <Templates maps={all} />
-      <Scenarios
-        list={scenarios.value ?? []}
-        importing={importing}
-        onRemove={(name) => setRemoving({ kind: "scenario", name })}
-      />
+      {own.length === 0 && mine}
       <Button
         mt="xl"
         variant="subtle"

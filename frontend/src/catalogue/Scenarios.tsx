@@ -24,6 +24,15 @@ import { go, hashOf } from "../ui/address";
 import { when } from "../run/figures";
 import { served } from "../language/served";
 
+/** So many are listed before the maps, the newest first. */
+const MOST = 6;
+
+/** Titles that several have. */
+function repeatedTitles(list: readonly ScenarioEntry[]): ReadonlySet<string> {
+  const titles = list.map((one) => one.title ?? one.name);
+  return new Set(titles.filter((title, n) => titles.indexOf(title) !== n));
+}
+
 /** The scenarios there are; one can be opened from a file. */
 export function Scenarios({
   list,
@@ -35,6 +44,10 @@ export function Scenarios({
   onRemove: (name: string) => void;
 }) {
   const [busy, setBusy] = useState(false);
+  const [whole, setWhole] = useState(false);
+  const newest = [...list].sort((a, b) => b.modified - a.modified);
+  const shown = whole || list.length <= MOST + 1 ? newest : newest.slice(0, MOST);
+  const ambiguous = repeatedTitles(list);
   const bring = (file: File | null): void => {
     if (!file) return;
     setBusy(true);
@@ -47,9 +60,9 @@ export function Scenarios({
     );
   };
   return (
-    <section aria-labelledby="scenarios" style={{ marginTop: 34 }}>
+    <section aria-labelledby="scenarios" style={{ marginTop: list.length > 0 ? 0 : 34 }}>
       <Group justify="space-between" mb="sm">
-        <Title order={2} size="h3" id="scenarios">
+        <Title order={list.length > 0 ? 1 : 2} size={list.length > 0 ? "h2" : "h3"} id="scenarios">
           <Trans>Your scenarios</Trans>
         </Title>
         <Group gap="sm">
@@ -84,13 +97,13 @@ export function Scenarios({
               <Table.Th>
                 <Trans>Name</Trans>
               </Table.Th>
-              <Table.Th>
+              <Table.Th visibleFrom="sm">
                 <Trans>Map</Trans>
               </Table.Th>
               <Table.Th>
                 <Trans>Road users</Trans>
               </Table.Th>
-              <Table.Th>
+              <Table.Th visibleFrom="xs">
                 <Trans>Changed</Trans>
               </Table.Th>
               <Table.Th>
@@ -101,25 +114,30 @@ export function Scenarios({
             </Table.Tr>
           </Table.Thead>
           <Table.Tbody>
-            {list.map((one) => (
+            {shown.map((one) => (
               <Table.Tr key={one.name}>
                 <Table.Td>
                   <Anchor href={hashOf({ view: "editor", scenario: one.name })}>
                     {one.title ?? one.name}
                   </Anchor>
+                  {ambiguous.has(one.title ?? one.name) && one.title !== one.name && (
+                    <Text span size="xs" c="dimmed" ml={8}>
+                      {one.name}
+                    </Text>
+                  )}
                   {one.error && (
                     <Text size="xs" c="red">
                       {served(one.error)}
                     </Text>
                   )}
                 </Table.Td>
-                <Table.Td>
+                <Table.Td visibleFrom="sm">
                   <Badge variant="default" tt="none">
                     {one.map ?? "?"}
                   </Badge>
                 </Table.Td>
                 <Table.Td>{one.actors}</Table.Td>
-                <Table.Td>{when(one.modified)}</Table.Td>
+                <Table.Td visibleFrom="xs">{when(one.modified)}</Table.Td>
                 <Table.Td>
                   <Group gap={12} justify="flex-end" wrap="nowrap">
                     <Anchor
@@ -143,6 +161,11 @@ export function Scenarios({
             ))}
           </Table.Tbody>
         </Table>
+      )}
+      {shown.length < list.length && (
+        <Button variant="subtle" size="compact-sm" mt={6} onClick={() => setWhole(true)}>
+          <Trans>Show all {list.length} scenarios</Trans>
+        </Button>
       )}
     </section>
   );

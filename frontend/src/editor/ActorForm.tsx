@@ -3,9 +3,16 @@ import { Checkbox, Group, Select, Stack } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import type { Actor, Assets, Edit } from "../api/types";
 import { DRIVERS, modelWord, styleChoices } from "../ui/words";
+import { hasClock } from "../language/moments";
 import { Committed } from "./Committed";
+import { MomentField } from "./MomentField";
 import { bodyOf } from "./scene";
 import { Silhouette } from "./Silhouette";
+
+/** The body that was typed; an emptied field gives back the usual one. */
+function sized(actor: Actor, length: number | null, width: number | null): Actor["size"] {
+  return length === null || width === null ? null : { length, width, height: actor.size?.height ?? null };
+}
 
 /** What one road user is and how it moves. */
 export function ActorForm({
@@ -51,12 +58,10 @@ export function ActorForm({
           value={actor.speed === null ? "" : actor.speed * 3.6}
           onCommit={(value) => change({ speed: value === null ? null : value / 3.6 })}
         />
-        <Committed
-          label={t`Departs after`}
-          suffix={" s"}
-          min={0}
-          max={86_400}
-          digits={1}
+        <MomentField
+          label={hasClock() ? t`Departs at` : t`Departs after`}
+          unit="s"
+          step={1}
           value={actor.depart}
           onCommit={(value) => change({ depart: value ?? 0 })}
         />
@@ -72,6 +77,40 @@ export function ActorForm({
             digits={2}
             value={actor.lateral_offset}
             onCommit={(value) => change({ lateral_offset: value ?? 0 })}
+          />
+          <Committed
+            label={t`Offset ahead`}
+            suffix={" m"}
+            min={-10}
+            max={10}
+            step={0.1}
+            digits={2}
+            value={actor.longitudinal_offset}
+            onCommit={(value) => change({ longitudinal_offset: value ?? 0 })}
+          />
+        </Group>
+      )}
+      {!walks && (
+        <Group grow align="flex-start">
+          <Committed
+            label={t`Length`}
+            suffix={" m"}
+            min={0.1}
+            max={30}
+            step={0.1}
+            digits={2}
+            value={length}
+            onCommit={(value) => change({ size: sized(actor, value, width) })}
+          />
+          <Committed
+            label={t`Width`}
+            suffix={" m"}
+            min={0.1}
+            max={5}
+            step={0.05}
+            digits={2}
+            value={width}
+            onCommit={(value) => change({ size: sized(actor, length, value) })}
           />
           <Select
             label={t`Driving style`}
@@ -153,14 +192,12 @@ export function ManyForm({
           value={speed ? speed * 3.6 : ""}
           onCommit={(value) => onChange({ speed: value === null ? null : value / 3.6 }, t`Speed`)}
         />
-        <Committed
-          label={t`All depart after`}
-          suffix={" s"}
-          min={0}
-          max={86_400}
-          digits={1}
+        <MomentField
+          label={hasClock() ? t`All depart at` : t`All depart after`}
+          unit="s"
+          step={1}
           placeholder={t`different`}
-          value={same("depart") ?? ""}
+          value={same("depart") ?? null}
           onCommit={(value) => onChange({ depart: value ?? 0 }, t`Departure`)}
         />
       </Group>

@@ -6,11 +6,11 @@ import { type ReactNode, useState } from "react";
 import type { Arrivals, Counts, Matrix, Mix, Zone } from "../api/demand";
 import type { Edit, FieldsOf } from "../api/types";
 import { IconTrash } from "../ui/icons";
-import { span } from "../ui/words";
-import { Committed } from "./Committed";
+import { hasClock, span } from "../language/moments";
 import { ProfileChart, ProfileChoice, type Profiles, profileWord } from "./DayProfiles";
 import { mixWords, timeOfDay, tripsOf } from "./demand";
 import { MixForm } from "./MixForm";
+import { MomentField } from "./MomentField";
 
 /** One part of the traffic, with its name and a button to remove it. */
 export function PartCard({
@@ -46,7 +46,7 @@ export function PartCard({
   );
 }
 
-/** From when until when a part of the traffic departs, in minutes of the run. */
+/** From when until when a part of the scenario is there. */
 export function WindowFields({
   begin,
   end,
@@ -58,24 +58,20 @@ export function WindowFields({
 }) {
   return (
     <Group grow align="flex-start">
-      <Committed
+      <MomentField
         label={t`From`}
-        suffix={" min"}
-        min={0}
-        max={1e5}
-        digits={1}
-        value={begin / 60}
-        onCommit={(value) => onChange({ begin: (value ?? 0) * 60 })}
+        unit="min"
+        step={60}
+        value={begin}
+        onCommit={(value) => onChange({ begin: value ?? 0 })}
       />
-      <Committed
+      <MomentField
         label={t`Until`}
-        suffix={" min"}
-        min={0.1}
-        max={1e5}
-        digits={1}
+        unit="min"
+        step={60}
         placeholder={t`the end`}
-        value={end === null ? "" : end / 60}
-        onCommit={(value) => onChange({ end: value === null ? null : value * 60 })}
+        value={end}
+        onCommit={(value) => onChange({ end: value })}
       />
     </Group>
   );
@@ -141,7 +137,11 @@ export function MatrixForm({
   const change = (fields: FieldsOf<"set_matrix", "matrix">): void =>
     onEdit({ kind: "set_matrix", matrix: matrix.id, ...fields });
   const when =
-    matrix.end === null ? t`until the end of the run` : t`${span(matrix.begin, matrix.end)} of the run`;
+    matrix.end === null
+      ? t`until the end of the run`
+      : hasClock()
+        ? span(matrix.begin, matrix.end)
+        : t`${span(matrix.begin, matrix.end)} of the run`;
   const note = t`${plural(Math.round(tripsOf(matrix)), { one: "# trip", other: "# trips" })} in ${plural(matrix.trips.length, { one: "# row", other: "# rows" })}, ${when}`;
   return (
     <PartCard name={matrix.id} what={t`Trips between zones`} note={note} onRemove={onRemove}>

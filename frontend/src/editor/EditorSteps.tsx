@@ -6,14 +6,15 @@ import { memo, useMemo, useState } from "react";
 import type { Chosen } from "../api/models";
 import type { Assets, Edit } from "../api/types";
 import { inBounds, inCircle } from "../map/areas";
+import { localized } from "../language/localized";
 import type { PackedDrawing } from "../map/drawing";
 import { ActorStep } from "./ActorStep";
-import { useStarter } from "./asked";
 import { criteriaNote } from "./criteria";
 import { CriteriaStep } from "./CriteriaStep";
 import { profilesOf } from "./DayProfiles";
 import { bringsTraffic, trafficNote } from "./demand";
 import { EnvironmentStep } from "./EnvironmentStep";
+import { LightsStep, lightsNote } from "./LightsStep";
 import { measureNote } from "./measures";
 import { MeasuresStep } from "./MeasuresStep";
 import { MapStep, RegionStep } from "./MapSteps";
@@ -22,6 +23,8 @@ import { parameterNote } from "./parameters";
 import { ParametersStep } from "./ParametersStep";
 import { ruleNote, RulesStep } from "./rules/RulesStep";
 import { rowsWithin } from "./regions";
+import type { Step } from "./scene";
+import type { RunChoices } from "./runChoices";
 import { RunStep } from "./RunStep";
 import { Steps } from "./Steps";
 import type { EditorStore } from "./store";
@@ -37,7 +40,35 @@ interface Props {
   now: EditorNow;
   drawing: PackedDrawing;
   assets: Assets | null;
+  choices: RunChoices;
+  /** What keeps the scenario from being run. */
+  hindrance: Hindrance | null;
+  starting: boolean;
+  onRun: () => void;
 }
+
+/** Errors to be solved, or no road users. */
+export interface Hindrance {
+  errors: number;
+  empty: boolean;
+}
+
+/** What the steps are called. */
+export const STEP_TITLE = localized((): Record<Step, string> => ({
+  map: t`Map`,
+  region: t`Region`,
+  environment: t`Weather and time`,
+  actors: t`Road users`,
+  traffic: t`Demand`,
+  transit: t`Public transport`,
+  lights: t`Traffic lights`,
+  measures: t`Measures`,
+  rules: t`Rules`,
+  parameters: t`Parameters`,
+  study: t`Analysis`,
+  criteria: t`Criteria`,
+  run: t`Run`,
+}));
 
 /** The steps, each with its forms; they are not made anew as the pointer moves. */
 export const EditorSteps = memo(
@@ -46,14 +77,15 @@ export const EditorSteps = memo(
     before.store === after.store &&
     before.drawing === after.drawing &&
     before.assets === after.assets &&
+    before.choices === after.choices &&
+    before.starting === after.starting &&
     sameButPointer(old, now),
 );
 
-function AllSteps({ store, now, drawing, assets }: Props) {
+function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, onRun }: Props) {
   const {
     scenario: { name, version },
     document,
-    problems,
     graph,
     region,
     ones,
@@ -64,7 +96,6 @@ function AllSteps({ store, now, drawing, assets }: Props) {
     openStep,
   } = now;
   const { roi, demand, environment, map, measures, study, transit } = document;
-  const run = useStarter(name);
   const [filling, setFilling] = useState(false);
   const profiles = useMemo(() => profilesOf(demand, assets?.day_profiles ?? {}), [demand, assets]);
   const selected = useMemo(() => {
@@ -75,8 +106,8 @@ function AllSteps({ store, now, drawing, assets }: Props) {
     const kinds = new Map(graph.columns.segments.map(({ id, kind }) => [id, kind]));
     return roi.filter((id) => kinds.get(id) !== "junction");
   }, [graph, roi]);
-  const errors = problems.filter(({ severity }) => severity === "error").length;
-  const lights = drawing.symbols.some(([kind]) => kind.includes("light"));
+  const errors = hindrance?.errors ?? 0;
+  const junctions = now.lights?.junctions ?? [];
 
   const addNeighbours = (): void =>
     changes.change(
@@ -87,19 +118,20 @@ function AllSteps({ store, now, drawing, assets }: Props) {
     setFilling(true);
     if (await changes.fill(share, seed, filler).finally(() => setFilling(false))) now.select([]);
   };
+  const titles = STEP_TITLE();
   return (
     <Steps
       open={now.step}
       onOpen={openStep}
       steps={{
         map: {
-          title: t`Map`,
+          title: titles.map,
           done: true,
           note: map.name,
           body: <MapStep name={map.name} onShow={() => sights.bounds(drawing.bounds)} />,
         },
         region: {
-          title: t`Region`,
+          title: titles.region,
           done: roi.length > 0,
           note: roi.length
             ? plural(roi.length, { one: "# segment", other: "# segments" })
@@ -125,7 +157,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         environment: {
-          title: t`Weather and time`,
+          title: titles.environment,
           done: roi.length > 0,
           note: weatherNote(assets, environment.preset),
           body: assets ? (
@@ -140,7 +172,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         actors: {
-          title: t`Road users`,
+          title: titles.actors,
           done: ones.length > 0,
           note: actorNote(document),
           body:
@@ -180,14 +212,14 @@ function AllSteps({ store, now, drawing, assets }: Props) {
                 />
                 {ones.length > 0 && (
                   <Button variant="default" onClick={() => openStep("traffic")}>
-                    <Trans>Next: traffic</Trans>
+                    <Trans>Next: demand</Trans>
                   </Button>
                 )}
               </>
             ),
         },
         traffic: {
-          title: t`Traffic`,
+          title: titles.traffic,
           done: bringsTraffic(demand),
           note: trafficNote(demand),
           body: (
@@ -200,14 +232,14 @@ function AllSteps({ store, now, drawing, assets }: Props) {
                 onEdit={changes.change}
                 onShow={sights.segments}
               />
-              <Button onClick={() => openStep("run")}>
-                <Trans>Next: run</Trans>
+              <Button variant="default" onClick={() => openStep("transit")}>
+                <Trans>Next: public transport</Trans>
               </Button>
             </>
           ),
         },
         transit: {
-          title: t`Public transport`,
+          title: titles.transit,
           done: transit.lines.length > 0,
           note: transitNote(transit),
           body: (
@@ -220,8 +252,22 @@ function AllSteps({ store, now, drawing, assets }: Props) {
             />
           ),
         },
+        lights: {
+          title: titles.lights,
+          done: document.signals.junctions.length > 0,
+          note: now.lights ? lightsNote(junctions) : "…",
+          body: (
+            <LightsStep
+              junctions={junctions}
+              shown={now.light}
+              control={document.signals.control}
+              onEdit={changes.change}
+              onShow={now.showLight}
+            />
+          ),
+        },
         measures: {
-          title: t`Measures`,
+          title: titles.measures,
           done: measures.length > 0,
           note: measureNote(measures),
           body: (
@@ -235,7 +281,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         rules: {
-          title: t`Rules`,
+          title: titles.rules,
           done: document.rules.length > 0,
           note: ruleNote(document.rules),
           body: (
@@ -249,7 +295,7 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         parameters: {
-          title: t`Parameters`,
+          title: titles.parameters,
           done: Object.keys(document.parameters).length > 0,
           note: parameterNote(document.parameters),
           body: (
@@ -261,13 +307,13 @@ function AllSteps({ store, now, drawing, assets }: Props) {
                 const user = ones.find((each) => each.id === id);
                 const rule = document.rules.find((each) => each.id === id);
                 if (root === "rules" && rule) sights.rule(rule, document.actors);
-                else if (user) sights.start(user);
+                else if (user) sights.close(user);
               }}
             />
           ),
         },
         study: {
-          title: t`Study`,
+          title: titles.study,
           done: studyNote(study) !== WHOLE_RUN(),
           note: studyNote(study),
           body: (
@@ -281,13 +327,13 @@ function AllSteps({ store, now, drawing, assets }: Props) {
           ),
         },
         criteria: {
-          title: t`Criteria`,
+          title: titles.criteria,
           done: document.criteria.length > 0,
           note: criteriaNote(document.criteria),
           body: <CriteriaStep document={document} onEdit={changes.change} />,
         },
         run: {
-          title: t`Run`,
+          title: titles.run,
           done: false,
           note: errors
             ? t`${plural(errors, { one: "# problem", other: "# problems" })} to solve first`
@@ -297,16 +343,12 @@ function AllSteps({ store, now, drawing, assets }: Props) {
               name={name}
               version={version}
               document={document}
-              lights={lights}
+              choices={choices}
               blocked={errors > 0}
-              busy={run.busy}
-              empty={ones.length === 0 && !bringsTraffic(demand) && !document.sumo}
+              busy={starting}
+              empty={hindrance?.empty ?? false}
               onEdit={changes.change}
-              onRun={run.start}
-              onLights={() => {
-                const [first] = now.lights?.junctions ?? [];
-                if (first) now.showLight(first);
-              }}
+              onRun={onRun}
             />
           ),
         },

@@ -1,4 +1,5 @@
 import { Button, Menu } from "@mantine/core";
+import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useState } from "react";
 
@@ -28,8 +29,10 @@ export function ExportMenu({
     <>
       <Menu position="bottom-end" withinPortal={false} withInitialFocusPlaceholder={false}>
         <Menu.Target>
-          <Button variant="default" leftSection={<IconDown size={15} />}>
-            <Trans>Export</Trans>
+          <Button variant="default" leftSection={<IconDown size={15} />} aria-label={t`Export`}>
+            <span className="wide-word">
+              <Trans>Export</Trans>
+            </span>
           </Button>
         </Menu.Target>
         <Menu.Dropdown>

@@ -5,6 +5,7 @@ import type { Edit, Flow } from "../api/types";
 import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
 import { MixForm } from "./MixForm";
+import { MomentField } from "./MomentField";
 
 /** Volume, time and mix of a flow. */
 export function FlowForm({
@@ -32,23 +33,17 @@ export function FlowForm({
       />
       <ProfileChoice value={flow.profile} profiles={profiles} onChange={(profile) => change({ profile })} />
       <Group grow align="flex-start">
-        <Committed
+        <MomentField
           label={t`From`}
-          suffix={" s"}
-          min={0}
-          max={1e6}
+          unit="s"
           step={10}
-          digits={0}
           value={flow.begin}
           onCommit={(value) => change({ begin: value ?? 0 })}
         />
-        <Committed
+        <MomentField
           label={t`Until`}
-          suffix={" s"}
-          min={1}
-          max={1e6}
+          unit="s"
           step={10}
-          digits={0}
           value={flow.end}
           onCommit={(value) => change({ end: value ?? flow.end })}
         />

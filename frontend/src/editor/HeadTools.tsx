@@ -8,7 +8,7 @@ import { localized } from "../language/localized";
 import { api } from "../api/client";
 import { exchange } from "../api/exchange";
 import { isXosc } from "../exchange/useImport";
-import { IconHelp, IconMenu, IconRedo, IconSearch, IconTour, IconUndo } from "../ui/icons";
+import { IconHelp, IconMenu, IconPlay, IconRedo, IconSearch, IconTour, IconUndo } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
 import { go } from "../ui/address";
 import { ExportMenu } from "./ExportMenu";
@@ -26,6 +26,8 @@ type Dialog = "rename" | "copy" | "open" | null;
 /** Undo, redo, autosave and files, in the head of the page. */
 export const HeadTools = memo(function HeadTools({
   store,
+  starting,
+  onRun,
   onFind,
   onHelp,
   onTour,
@@ -33,6 +35,9 @@ export const HeadTools = memo(function HeadTools({
   onVector,
 }: {
   store: EditorStore;
+  /** Whether a run is being started. */
+  starting: boolean;
+  onRun: () => void;
   onFind: () => void;
   onHelp: () => void;
   onTour: () => void;
@@ -84,7 +89,12 @@ export const HeadTools = memo(function HeadTools({
   };
   return createPortal(
     <>
-      <span className="saving" role="status" data-checked={checked === scenario?.document}>
+      <span
+        className="saving"
+        role="status"
+        data-checked={checked === scenario?.document}
+        data-state={saving}
+      >
         {SAVED()[saving]}
       </span>
       {tools.map(({ word, keys, label, act, icon }) => (
@@ -100,13 +110,8 @@ export const HeadTools = memo(function HeadTools({
           </ActionIcon>
         </Tooltip>
       ))}
-      <Tooltip label={t`Find a road, a junction or a road user (Ctrl+K)`}>
-        <ActionIcon
-          variant="default"
-          size="lg"
-          aria-label={t`Find a road, a junction or a road user`}
-          onClick={onFind}
-        >
+      <Tooltip label={t`Find a place or a road user, or do anything (Ctrl+K)`}>
+        <ActionIcon variant="default" size="lg" aria-label={t`Find or do`} onClick={onFind}>
           <IconSearch />
         </ActionIcon>
       </Tooltip>
@@ -117,8 +122,10 @@ export const HeadTools = memo(function HeadTools({
         onOpen={askForReport}
       >
         <Menu.Target>
-          <Button variant="default" leftSection={<IconMenu />}>
-            <Trans>Scenario</Trans>
+          <Button variant="default" leftSection={<IconMenu />} aria-label={t`Scenario`}>
+            <span className="wide-word">
+              <Trans>Scenario</Trans>
+            </span>
           </Button>
         </Menu.Target>
         <Menu.Dropdown>
@@ -145,6 +152,11 @@ export const HeadTools = memo(function HeadTools({
         </Menu.Dropdown>
       </Menu>
       <ExportMenu name={name} onPicture={onPicture} onVector={onVector} />
+      <Tooltip label={t`Run the scenario (Ctrl+Enter)`}>
+        <Button leftSection={<IconPlay />} loading={starting} onClick={onRun}>
+          <Trans context="button">Run</Trans>
+        </Button>
+      </Tooltip>
       <input
         ref={file}
         type="file"

@@ -26,6 +26,7 @@ const ROWS = localized((): Partial<Record<Step, [color: string, word: string, sh
   ],
   transit: [[TRANSIT, t`Stop, begin or end of a line`]],
   study: [[TRANSIT, t`D detector, S section, C cordon`]],
+  lights: [[TRANSIT, t`Traffic light`]],
   measures: [[MEASURE, t`Measure`]],
   rules: [[MARK_COLOR.rule, t`Where rules act`]],
   actors: [

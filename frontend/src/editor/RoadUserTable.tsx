@@ -3,6 +3,7 @@ import { plural, t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { type KeyboardEvent, memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 
+import { clock, hasClock } from "../language/moments";
 import { speedText } from "../language/units";
 import { localized } from "../language/localized";
 import { type Actor, CATEGORIES, type Flow } from "../api/types";
@@ -258,7 +259,7 @@ const Cells = memo(function Cells({
       </td>
       <td>{one.goal ? <span title={one.goal}>{placeWord(graph, one.goal)}</span> : t`random`}</td>
       <td>{speedWord(one)}</td>
-      <td>{isFlow(one) ? t`${one.begin} to ${one.end} s` : t`after ${one.depart} s`}</td>
+      <td>{departWords(one)}</td>
       <td>
         {isFlow(one)
           ? t`${Math.round(one.per_hour)} per hour`
@@ -299,4 +300,10 @@ function kindWord(one: Actor | Flow): string {
 function speedWord(one: Actor | Flow): string {
   if (one.speed !== null) return speedText(one.speed);
   return walks(one) ? t`default` : t`speed limit`;
+}
+
+function departWords(one: Actor | Flow): string {
+  if (isFlow(one))
+    return hasClock() ? t`${clock(one.begin)} to ${clock(one.end)}` : t`${one.begin} to ${one.end} s`;
+  return hasClock() ? clock(one.depart) : t`after ${one.depart} s`;
 }

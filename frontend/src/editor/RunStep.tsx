@@ -1,11 +1,9 @@
 import { Button, NumberInput, SegmentedControl, Select, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { useState } from "react";
 
 import { localized } from "../language/localized";
-import { type Chosen, models } from "../api/models";
-import type { RunWish } from "../api/runs";
+import { models } from "../api/models";
 import type { Edit, ScenarioDocument } from "../api/types";
 import { CarlaChoice } from "../carla/CarlaChoice";
 import { driverWords } from "../ui/drivers";
@@ -14,12 +12,9 @@ import { Duration } from "./Duration";
 import { Forecast } from "./Forecast";
 import { MeasureList } from "./MeasureList";
 import { ModelChoice } from "./ModelChoice";
+import type { RunChoices } from "./runChoices";
 import { SimulatorChoice } from "./SimulatorChoice";
 
-const CONTROLS = localized(() => [
-  { value: "fixed", label: t`Fixed-time` },
-  { value: "actuated", label: t`Actuated` },
-]);
 const PACES = localized(() => [
   { value: "real", label: t`Real time` },
   { value: "fast", label: t`As fast as possible` },
@@ -30,62 +25,35 @@ const RECORDINGS = localized(() => [
   { value: "10", label: t`Every 10 seconds` },
   { value: "none", label: t`Nothing` },
 ]);
-/** Longer runs are made in slices, and not watched in real time. */
-const LONG = 3600;
 
-/** Duration, signal control, what is recorded, and the start of a run. */
+/** What is started, its duration, what is recorded, and how fast it begins. */
 export function RunStep({
   name,
   version,
   document,
-  lights,
+  choices,
   blocked,
   empty,
   busy,
   onEdit,
   onRun,
-  onLights,
 }: {
   name: string;
   version: number;
   document: ScenarioDocument;
-  lights: boolean;
+  choices: RunChoices;
   blocked: boolean;
   empty: boolean;
   busy: boolean;
   onEdit: (edit: Edit) => void;
-  onRun: (wish: RunWish) => void;
-  /** Shows the programs of the traffic lights. */
-  onLights: () => void;
+  onRun: () => void;
 }) {
   const {
     simulation: { duration },
     seed,
-    signals: { control },
     measures,
   } = document;
-  const [inCarla, setInCarla] = useState(false);
-  const [recording, setRecording] = useState("step");
-  const [pace, setPace] = useState<string | null>(null);
-  const [driver, setDriver] = useState<Chosen | null>(null);
-  const [simulator, setSimulator] = useState<Chosen | null>(null);
-  const long = duration > LONG;
-  const chosenPace = pace ?? (long ? "fast" : "real");
-  const every = inCarla || recording === "step" || recording === "none" ? null : Number(recording);
-  const wish: RunWish = {
-    scenario: name,
-    speed: chosenPace === "fast" ? null : 1,
-    carla: inCarla,
-    trajectories: inCarla || recording !== "none",
-    every,
-    ...(driver && { behaviour: driver }),
-  };
-  const elsewhere: RunWish | null = simulator && {
-    scenario: name,
-    trajectories: recording !== "none",
-    every: recording === "step" || recording === "none" ? null : Number(recording),
-    simulator,
-  };
+  const { inCarla, recording, driver, simulator, long, pace, wish, choose } = choices;
   return (
     <>
       <Duration
@@ -123,34 +91,15 @@ export function RunStep({
         value={inCarla && !simulator ? "step" : recording}
         disabled={inCarla && !simulator}
         allowDeselect={false}
-        onChange={(value) => setRecording(value ?? "step")}
+        onChange={(value) => choose({ recording: value ?? "step" })}
       />
-      {lights && (
-        <div>
-          <Text size="sm" fw={500}>
-            <Trans>Signal control</Trans>
-          </Text>
-          <SegmentedControl
-            fullWidth
-            data={CONTROLS()}
-            value={control}
-            aria-label={t`Signal control`}
-            onChange={(value) =>
-              onEdit({ kind: "set_signal_control", control: value === "actuated" ? value : "fixed" })
-            }
-          />
-          <Text size="xs" c="dimmed" mt={4}>
-            {control === "fixed"
-              ? t`Every signal keeps its times.`
-              : t`A green is extended while vehicles arrive.`}
-          </Text>
-          <Button size="compact-sm" variant="default" mt={6} onClick={onLights}>
-            <Trans>Show the signal programs</Trans>
-          </Button>
-        </div>
-      )}
       <MeasureList measures={measures} />
-      <SimulatorChoice scenario={name} version={version} chosen={simulator} onChange={setSimulator} />
+      <SimulatorChoice
+        scenario={name}
+        version={version}
+        chosen={simulator}
+        onChange={(next) => choose({ simulator: next })}
+      />
       {!simulator && (
         <>
           <ModelChoice
@@ -160,7 +109,7 @@ export function RunStep({
             words={driverWords}
             unusable={t`This behaviour model cannot be used`}
             chosen={driver}
-            onChange={setDriver}
+            onChange={(next) => choose({ driver: next })}
           />
           <div>
             <Text size="sm" fw={500}>
@@ -169,17 +118,17 @@ export function RunStep({
             <SegmentedControl
               fullWidth
               data={PACES()}
-              value={chosenPace}
+              value={pace}
               aria-label={t`Speed at the start`}
-              onChange={setPace}
+              onChange={(next) => choose({ pace: next })}
             />
           </div>
-          <CarlaChoice chosen={inCarla} onChoose={setInCarla} />
+          <CarlaChoice chosen={inCarla} onChoose={(next) => choose({ inCarla: next })} />
         </>
       )}
       {empty && (
         <Text size="sm">
-          <Trans>There are no road users yet. Place some in “Road users”, or add traffic in “Traffic”.</Trans>
+          <Trans>There are no road users yet. Place some in “Road users”, or add traffic in “Demand”.</Trans>
         </Text>
       )}
       {blocked && (
@@ -188,13 +137,7 @@ export function RunStep({
         </Text>
       )}
       {!blocked && !empty && !simulator && <Forecast wish={wish} version={version} />}
-      <Button
-        size="md"
-        leftSection={<IconPlay />}
-        loading={busy}
-        disabled={blocked || empty}
-        onClick={() => onRun(elsewhere ?? wish)}
-      >
+      <Button size="md" leftSection={<IconPlay />} loading={busy} disabled={blocked || empty} onClick={onRun}>
         <Trans context="button">Run</Trans>
       </Button>
     </>

@@ -143,6 +143,7 @@ export function Stage({
         />
       ) : (
         <RoadUserTable
+          key={document.demand.clock} // says when all depart
           place={step}
           head={head}
           open={open}

@@ -1,7 +1,12 @@
-import { type ReactNode, useEffect, useRef } from "react";
+import { t } from "@lingui/core/macro";
+import { type ReactNode, useEffect, useId, useRef } from "react";
 
+import { localized } from "../language/localized";
 import { IconCheck } from "../ui/icons";
-import { type Step, STEPS } from "./scene";
+import { type Step, STEP_GROUPS, type StepGroup } from "./scene";
+
+/** Pixels of a window in which all lies below each other; those of narrow.css. */
+const NARROW = 900;
 
 export interface StepText {
   title: string;
@@ -9,6 +14,13 @@ export interface StepText {
   done: boolean;
   body: ReactNode;
 }
+
+const GROUP_WORD = localized((): Record<StepGroup, string> => ({
+  place: t`Place`,
+  traffic: t`Traffic`,
+  control: t`Control`,
+  evaluate: t`Evaluate`,
+}));
 
 /** The guided order; every step can be opened at any time. */
 export function Steps({
@@ -21,37 +33,48 @@ export function Steps({
   steps: Record<Step, StepText>;
 }) {
   const list = useRef<HTMLDivElement>(null);
+  const id = useId();
   useEffect(() => {
-    list.current?.querySelector("[aria-expanded=true]")?.scrollIntoView({ block: "nearest" });
-    list.current?.querySelector(".step-body")?.scrollIntoView({ block: "nearest" });
+    const head = list.current?.querySelector("[aria-expanded=true]");
+    // Where the page itself scrolls, a long form must not push its heading below the map.
+    if (innerWidth <= NARROW) void head?.scrollIntoView({ block: "start" });
+    else {
+      void head?.scrollIntoView({ block: "nearest" });
+      void list.current?.querySelector(".step-body")?.scrollIntoView({ block: "nearest" });
+    }
   }, [open]);
   return (
     <div className="steps" ref={list}>
-      {STEPS.map((step, n) => {
-        const { title, note, done, body } = steps[step];
-        const expanded = open === step;
-        return (
-          <section key={step} aria-label={title}>
-            <button
-              type="button"
-              className="step-head"
-              aria-expanded={expanded}
-              data-done={done}
-              onClick={() => onOpen(step)}
-            >
-              <span className="step-number" aria-hidden="true">
-                {done && !expanded ? <IconCheck size={15} /> : n + 1}
-              </span>
-              <span>
-                <span className="step-title">{title}</span>
-                <br />
-                <span className="step-note">{note}</span>
-              </span>
-            </button>
-            {expanded && <div className="step-body">{body}</div>}
-          </section>
-        );
-      })}
+      {(Object.keys(STEP_GROUPS) as StepGroup[]).map((group) => (
+        <div key={group} role="group" aria-labelledby={`${id}-${group}`}>
+          <h2 id={`${id}-${group}`} className="step-group">
+            {GROUP_WORD()[group]}
+          </h2>
+          {STEP_GROUPS[group].map((step) => {
+            const { title, note, done, body } = steps[step];
+            const expanded = open === step;
+            return (
+              <section key={step} aria-label={title}>
+                <button
+                  type="button"
+                  className="step-head"
+                  aria-expanded={expanded}
+                  data-done={done}
+                  onClick={() => onOpen(step)}
+                >
+                  <span className="step-mark" aria-hidden="true">
+                    {done && <IconCheck size={13} />}
+                  </span>
+                  <span className="step-words">
+                    <span className="step-title">{title}</span> <span className="step-note">{note}</span>
+                  </span>
+                </button>
+                {expanded && <div className="step-body">{body}</div>}
+              </section>
+            );
+          })}
+        </div>
+      ))}
     </div>
   );
 }

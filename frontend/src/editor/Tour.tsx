@@ -5,6 +5,7 @@ import { useEffect, useRef, useState } from "react";
 
 import { localized } from "../language/localized";
 import { nth } from "../lists";
+import { closesList } from "../ui/lists";
 import type { Step } from "./scene";
 
 const KEY = "odscen.tour";
@@ -23,8 +24,12 @@ const STEPS = localized((): readonly [title: string, text: string][] => [
   ],
 ]);
 
-/** Whether this is the first visit; without storage no visit is. */
+let offered = false;
+
+/** Whether this is the first visit; without storage no visit is, and who comes back from a run is none. */
 export function firstVisit(): boolean {
+  if (offered) return false;
+  offered = true;
   try {
     return localStorage.getItem(KEY) === null;
   } catch {
@@ -62,7 +67,7 @@ export function Tour({ step, onClose }: { step: Step; onClose: () => void }) {
       role="dialog"
       aria-label={t`Short tour`}
       onKeyDown={(event) => {
-        if (event.key === "Escape") {
+        if (event.key === "Escape" && !closesList(event)) {
           onClose();
           event.stopPropagation();
         }

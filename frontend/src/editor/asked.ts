@@ -6,7 +6,9 @@ import type { Actor, Flow, Roi } from "../api/types";
 import { nth } from "../lists";
 import type { Graph, Place } from "../map/graph";
 import { tellError } from "../ui/notices";
-import { go } from "../ui/address";
+import type { View } from "../map/view";
+import { hashOf } from "../ui/address";
+import { openedWith } from "../ui/kept";
 import type { Trial } from "./handlers/handler";
 import { stationsOf, viasOf } from "./placing";
 
@@ -134,15 +136,21 @@ export function useTrial(name: string, trial: Trial | null): TrialRoute {
   }, [found, key]);
 }
 
-/** Starts a run and leads to it. */
-export function useStarter(name: string): { busy: boolean; start: (wish: RunWish) => void } {
+/** Starts a run and leads to it, with a part of the map in sight. */
+export function useStarter(name: string): {
+  busy: boolean;
+  start: (wish: RunWish, at?: View | null) => void;
+} {
   const [busy, setBusy] = useState(false);
   return {
     busy,
-    start: (wish) => {
+    start: (wish, at) => {
       setBusy(true);
       runs.start(wish).then(
-        ({ run }) => go({ view: "run", scenario: name, run }),
+        ({ run }) => {
+          const hash = hashOf({ view: "run", scenario: name, run });
+          location.hash = at ? openedWith(hash, { at }) : hash;
+        },
         (error: unknown) => {
           setBusy(false);
           tellError(error);

@@ -1,9 +1,10 @@
 import { plural, t } from "@lingui/core/macro";
 
 import type { Chosen } from "../api/models";
-import type { Actor, Category, Edit, Flow, ScenarioState } from "../api/types";
+import type { Actor, Category, Edit, Flow, ScenarioDocument, ScenarioState } from "../api/types";
 import type { Graph, Place } from "../map/graph";
 import { extension } from "./regions";
+import { type AskedRemoval, type Uses, usesOf } from "./uses";
 import { isFlow, type Moves, type Starts } from "./placing";
 
 /** Volume of a new flow. */
@@ -18,7 +19,11 @@ export interface Changes {
   /** Copies road users so that the first starts at `to`; the others keep their distances. */
   copy: (ids: readonly string[], to: Place) => void;
   move: (ids: readonly string[], to: Place) => void;
-  remove: (ids: readonly string[]) => void;
+  /**
+   * Removes road users, and rules and criteria if they are given; where some are used by such and none
+   * are given, it is asked first.
+   */
+  remove: (ids: readonly string[], withUses?: Uses) => void;
   setStart: (one: Actor | Flow, spawn: string) => void;
   setGoal: (one: Actor | Flow, goal: string | null) => void;
   /** Adds segments to the region: those that hang together with it. */
@@ -30,18 +35,23 @@ export interface Changes {
 /** What can be done to road users and flows, as edits that the server is asked for. */
 export function changesOf({
   graph,
+  document,
   roi,
   ones,
   starts,
   edit,
   say,
+  ask,
 }: {
   graph: Graph;
+  document: Pick<ScenarioDocument, "rules" | "criteria">;
   roi: readonly string[];
   ones: readonly (Actor | Flow)[];
   starts: Starts;
   edit: (edit: Edit | readonly Edit[], label?: string) => Promise<ScenarioState | null>;
   say: (text: string) => void;
+  /** Asks what is to become of rules and criteria. */
+  ask: (removal: AskedRemoval) => void;
 }): Changes {
   const change = (asked: Edit | readonly Edit[], label?: string): void => {
     void edit(asked, label);
@@ -51,14 +61,14 @@ export function changesOf({
     // In the order of the ids: the first leads.
     return ids.flatMap((id) => known.get(id) ?? []);
   };
-  const shifted = (moved: readonly (Actor | Flow)[], to: Place): Moves => {
-    const moves = starts.shifted(moved, to);
+  const shifted = (moved: readonly (Actor | Flow)[], to: Place, move: boolean): Moves => {
+    const moves = starts.shifted(moved, to, move);
     const left = moved.length - moves.length;
     if (left > 0)
       say(
         plural(left, {
-          one: "# road user found no free point there and was left out.",
-          other: "# road users found no free point there and were left out.",
+          one: "# road user found no free point in the region and was left out.",
+          other: "# road users found no free point in the region and were left out.",
         }),
       );
     return moves;
@@ -76,14 +86,14 @@ export function changesOf({
       }),
     copy: (ids, to) => {
       const copied = among(ids);
-      const moves = shifted(copied, to);
+      const moves = shifted(copied, to, false);
       if (moves.length === 0) return;
       const copies = Object.fromEntries(moves.map(([id, spawn]) => [spawn, id]));
       change({ kind: "copy_actors", copies }, labelOf(t`Copy`, copied, moves.length));
     },
     move: (ids, to) => {
       const moved = among(ids);
-      const moves = shifted(moved, to);
+      const moves = shifted(moved, to, true);
       if (moves.length === 0) return;
       const spawns = new Map(moves);
       const edits = moved.flatMap((one) => {
@@ -92,11 +102,21 @@ export function changesOf({
       });
       change(edits, labelOf(t`Move`, moved, moves.length));
     },
-    remove: (ids) => {
+    remove: (ids, withUses) => {
       const gone = among(ids);
+      const uses = withUses ?? usesOf(document, ids);
+      if (withUses === undefined && (uses.rules.length > 0 || uses.criteria.length > 0)) {
+        ask({ ids, uses });
+        return;
+      }
       const actors = gone.filter((one) => !isFlow(one)).map((one) => one.id);
       const edits: Edit[] = gone.filter(isFlow).map((one) => ({ kind: "remove_flow", flow: one.id }));
       if (actors.length > 0) edits.unshift({ kind: "remove_actors", actors });
+      edits.push(...uses.rules.map((rule): Edit => ({ kind: "remove_rule", rule })));
+      if (uses.criteria.length > 0) {
+        const criteria = document.criteria.filter((_, n) => !uses.criteria.includes(n));
+        edits.push({ kind: "set_criteria", criteria });
+      }
       if (edits.length > 0) change(edits, labelOf(t`Remove`, gone, gone.length));
     },
     setStart: (one, spawn) => change(startOf(one, spawn)),

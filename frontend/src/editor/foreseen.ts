@@ -129,7 +129,8 @@ function environmentAfter(
 
 function withNewActor(document: ScenarioDocument, edit: EditOf<"add_actor">): ScenarioDocument {
   const id = edit.id ?? freeId(document, edit.category);
-  const actor: Actor = { ...NEW_ACTOR, ...without(edit, "kind"), id };
+  const size = edit.size ? { height: null, ...edit.size } : null;
+  const actor: Actor = { ...NEW_ACTOR, ...without(edit, "kind"), id, size };
   const grown = { ...document, actors: [...document.actors, actor] };
   return actor.ego ? (withEgo(grown, actor.id) ?? grown) : grown;
 }

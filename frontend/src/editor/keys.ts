@@ -10,6 +10,7 @@ export interface KeyActions {
   escape: () => void;
   sheet: () => void;
   find: () => void;
+  run: () => void;
   copy: () => void;
   move: () => void;
   paste: () => void;
@@ -57,6 +58,7 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
       y: actions.redo,
       a: actions.selectAll,
       k: actions.find,
+      enter: actions.run,
       v: actions.paste,
       ...(marked ? {} : { c: actions.copy }),
     };
@@ -81,7 +83,8 @@ function actionOf(event: KeyboardEvent, actions: KeyActions): (() => void) | nul
 
 export const SHORTCUTS = localized((): readonly (readonly [keys: string, what: string])[] => [
   [t`Ctrl+Z / Ctrl+Y`, t`Undo / redo`],
-  [t`Ctrl+K`, t`Find a road, a junction or a road user`],
+  [t`Ctrl+Enter`, t`Run the scenario`],
+  [t`Ctrl+K`, t`Find a road, a junction or a road user, or do anything by its name`],
   ["1 – 7", t`Place a car, van, truck, bus, motorcycle, bicycle, pedestrian`],
   ["8 / 9", t`Place a vehicle flow / pedestrian flow`],
   [t`Ctrl+C`, t`Copy what is selected: then choose where`],

@@ -3,7 +3,7 @@ import { plural, t } from "@lingui/core/macro";
 import { lengthText, speedText } from "../language/units";
 import { localized } from "../language/localized";
 import type { ScenarioDocument } from "../api/types";
-import { clock } from "../ui/words";
+import { clock } from "../language/moments";
 import type { PickBy, Picked } from "./pick";
 
 export type Measure = ScenarioDocument["measures"][number];

@@ -1,24 +1,20 @@
 import type { Actor, Assets, Bounds, Flow, Problem, ScenarioDocument } from "../api/types";
+import { bringsTraffic } from "./demand";
 import type { Area } from "../map/areas";
 import type { Graph, Place } from "../map/graph";
 import { segmentBounds } from "../map/graph";
 import type { SceneActor, SceneFlow, SegmentStyle } from "../map/scene";
 
-export const STEPS = [
-  "map",
-  "region",
-  "environment",
-  "actors",
-  "traffic",
-  "transit",
-  "measures",
-  "rules",
-  "parameters",
-  "study",
-  "criteria",
-  "run",
-] as const;
-export type Step = (typeof STEPS)[number];
+/** The steps of the editor in their groups, both in the order in which one usually goes. */
+export const STEP_GROUPS = {
+  place: ["map", "region", "environment"],
+  traffic: ["actors", "traffic", "transit"],
+  control: ["lights", "measures", "rules"],
+  evaluate: ["parameters", "study", "criteria", "run"],
+} as const;
+export type StepGroup = keyof typeof STEP_GROUPS;
+export type Step = (typeof STEP_GROUPS)[StepGroup][number];
+export const STEPS: readonly Step[] = Object.values(STEP_GROUPS).flat();
 
 /** How each segment is drawn: the first of the region dark blue, what may be added light blue. */
 export function segmentStyles(
@@ -43,7 +39,11 @@ export function insideRows(graph: Graph, roi: readonly string[]): Set<number> {
 }
 
 /** Length and width in metres: of the model, or what is usual for the kind. */
-export function bodyOf(actor: Pick<Actor, "category" | "model">, assets: Assets | null): [number, number] {
+export function bodyOf(
+  actor: Pick<Actor, "category" | "model" | "size">,
+  assets: Assets | null,
+): [number, number] {
+  if (actor.size) return [actor.size.length, actor.size.width];
   const found =
     assets?.blueprints.find((one) => one.id === actor.model) ??
     assets?.categories.find((one) => one.category === actor.category);
@@ -74,6 +74,7 @@ export function sceneActors(
     const place = graph.place(actor.spawn);
     if (!place) return [];
     const [length, width] = bodyOf(actor, assets);
+    const { lateral_offset: left, longitudinal_offset: ahead } = actor;
     return [
       {
         id: actor.id,
@@ -82,9 +83,9 @@ export function sceneActors(
         length,
         width,
         ego: actor.ego,
-        // The offset is to the left of the driving direction.
-        x: place.x - actor.lateral_offset * Math.sin(place.hdg),
-        y: place.y + actor.lateral_offset * Math.cos(place.hdg),
+        // The offsets are to the left of the driving direction and along it.
+        x: place.x - left * Math.sin(place.hdg) + ahead * Math.cos(place.hdg),
+        y: place.y + left * Math.cos(place.hdg) + ahead * Math.sin(place.hdg),
         offset: actor.lateral_offset,
         selected: selection.has(actor.id),
         problem: wrong.has(actor.id),
@@ -177,3 +178,15 @@ export function firstStep(document: ScenarioDocument): Step {
 export function boundsOfPlaces(places: readonly Place[]): Bounds {
   return places.map(({ x, y }): Bounds => [x, y, x, y]).reduce(join);
 }
+
+/** More placed road users than these are traffic. */
+export const MOST_ACTORS = 20;
+
+/** Whether a document is a story of some road users, without traffic around them. */
+export const isScene = ({ actors, flows, demand, transit, sumo }: ScenarioDocument): boolean =>
+  actors.length > 0 &&
+  actors.length <= MOST_ACTORS &&
+  flows.length === 0 &&
+  transit.lines.length === 0 &&
+  !bringsTraffic(demand) &&
+  !sumo;

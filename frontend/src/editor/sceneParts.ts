@@ -110,3 +110,10 @@ export function transitPins(graph: Graph, { stops, lines }: ScenarioDocument["tr
     ]),
   ];
 }
+
+/** A sign in the middle of each junction with a traffic light. */
+export const lightPins = (lights: Heads | null): ScenePin[] =>
+  (lights?.junctions ?? []).flatMap((junction): ScenePin[] => {
+    const middle = lights?.middle(junction);
+    return middle ? [{ ...middle, sign: "L", text: t`Junction ${junction}` }] : [];
+  });

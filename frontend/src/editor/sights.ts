@@ -14,7 +14,10 @@ import { boundsOfMeasure } from "./sceneParts";
 export interface Sights {
   bounds: (bounds: Bounds) => void;
   segments: (segments: readonly string[]) => void;
+  /** A start, at the scale that the map has; it stays where it is if it shows that already. */
   start: (one: Actor | Flow) => void;
+  /** A start, near enough to see it. */
+  close: (one: Actor | Flow) => void;
   /** A start together with all goals that can be reached from it. */
   goals: (one: Actor | Flow, goals: readonly Place[]) => void;
   /** Nodes, all of them. */
@@ -35,7 +38,8 @@ export interface Sights {
 /** Metres around what is shown. */
 const MARGIN = 25;
 
-const around = ([x0, y0, x1, y1]: Bounds): Bounds => [x0 - MARGIN, y0 - MARGIN, x1 + MARGIN, y1 + MARGIN];
+/** A rectangle with so many metres more at each side. */
+export const around = ([x0, y0, x1, y1]: Bounds, by = MARGIN): Bounds => [x0 - by, y0 - by, x1 + by, y1 + by];
 
 export function sightsOf(
   handle: RefObject<MapHandle | null>,
@@ -49,6 +53,10 @@ export function sightsOf(
     bounds: show,
     segments: (segments) => show(segmentsBounds(graph, segments)),
     start: (one) => {
+      const place = graph.place(one.spawn);
+      if (place) handle.current?.reveal(place.x, place.y);
+    },
+    close: (one) => {
       const place = graph.place(one.spawn);
       if (place) handle.current?.centre(place.x, place.y);
     },

@@ -2,6 +2,7 @@ import { t } from "@lingui/core/macro";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import type { Assets, MapDetails, Problem, ScenarioDocument, ScenarioState } from "../api/types";
+import { countFrom } from "../language/moments";
 import type { LoadedGraph } from "../map/loaded";
 import type { MapHandle } from "../map/MapCanvas";
 import type { LightProgram } from "../api/signals";
@@ -15,8 +16,9 @@ import type { Editing, Handler, Hover, Tool } from "./handlers/handler";
 import { usePick } from "./pick";
 import type { Draft } from "./rules/draft";
 import { everyone } from "./placing";
-import { firstStep, ofProblem, type Step, STEPS, wrongOnes } from "./scene";
+import { bodyOf, firstStep, ofProblem, type Step, STEPS, wrongOnes } from "./scene";
 import { type Sights, sightsOf } from "./sights";
+import type { AskedRemoval } from "./uses";
 import type { EditorStore } from "./store";
 import { useShown } from "./useShown";
 
@@ -30,6 +32,9 @@ export interface EditorNow extends Editing {
   drafted: Draft | null;
   setDrafted: (draft: Draft | null) => void;
   closeLight: () => void;
+  /** Road users that are to be removed though something uses them. */
+  removal: AskedRemoval | null;
+  setRemoval: (removal: AskedRemoval | null) => void;
   step: Step;
   tool: Tool | null;
   /** Takes a tool into the hand, or puts it back. */
@@ -76,6 +81,8 @@ export function useEditing(
   const { scenario, checked, selection, name, edit, select } = store();
   if (!scenario) throw new Error(t`the editor is only shown with a scenario`);
   const { document, problems } = scenario;
+  // What is shown below says moments as times of day if there is a clock.
+  countFrom(document.demand.clock, document.simulation.duration);
   const [step, setStep] = useState<Step>(() => keptStep() ?? firstStep(document));
   // A link selects who was selected when it was copied.
   useEffect(() => {
@@ -95,6 +102,7 @@ export function useEditing(
   );
   const handle = useRef<MapHandle | null>(null);
   const lights = useMemo(() => map && new Heads(map.lights), [map]);
+  const [removal, setRemoval] = useState<AskedRemoval | null>(null);
   const [drafted, setDrafted] = useState<Draft | null>(null);
   const [light, setLight] = useState<string | null>(null);
   const [program, setProgram] = useState<LightProgram | null>(null);
@@ -118,8 +126,8 @@ export function useEditing(
   const sights = useMemo(() => sightsOf(handle, graph, () => lights), [graph, lights]);
   const { roi } = document;
   const changes = useMemo(
-    () => changesOf({ graph, roi, ones, starts, edit, say: tell }),
-    [graph, roi, ones, starts, edit],
+    () => changesOf({ graph, document, roi, ones, starts, edit, say: tell, ask: setRemoval }),
+    [graph, document, roi, ones, starts, edit],
   );
 
   const pick = usePick();
@@ -149,6 +157,7 @@ export function useEditing(
     actors,
     flows,
     starts,
+    sizeOf: (category) => bodyOf({ category, model: null, size: null }, assets),
     selection,
     one,
     goals,
@@ -183,6 +192,8 @@ export function useEditing(
       setLight(null);
       pick.stop();
     },
+    removal,
+    setRemoval,
     step,
     tool,
     arm,
@@ -201,7 +212,7 @@ export function useEditing(
       if (!found) return;
       goTo("actors");
       select([id]);
-      sights.start(found);
+      sights.close(found);
     },
     showProblem: (problem) => {
       const about = ofProblem(problem, checked ?? document);

@@ -5,7 +5,7 @@ import { sceneDetectors } from "../signals/sceneDetectors";
 import { ruleShapes } from "./rules/ruleShapes";
 import { laneFacts } from "./placeWords";
 import { segmentStyles, type Step } from "./scene";
-import { measureShapes, stationPins, transitPins } from "./sceneParts";
+import { lightPins, measureShapes, stationPins, transitPins } from "./sceneParts";
 import { viasOf } from "./placing";
 import type { EditorNow } from "./useEditing";
 
@@ -43,6 +43,7 @@ export function useScene(now: EditorNow): Scene {
     [graph, rules, placed, drafted],
   );
   const stations = useMemo(() => stationPins(graph, study), [graph, study]);
+  const signals = useMemo(() => lightPins(lights), [lights]);
   const detectors = useMemo(() => sceneDetectors(program), [program]);
   return useMemo<Scene>(() => {
     const placing = step === "actors";
@@ -57,6 +58,7 @@ export function useScene(now: EditorNow): Scene {
       pins: [
         ...(measured ? shapes.pins : []),
         ...(served ? stops : []),
+        ...(step === "lights" ? signals : []),
         ...(studied ? stations : []),
         ...(RULED.has(step) ? ruled.pins : []),
       ],
@@ -89,6 +91,7 @@ export function useScene(now: EditorNow): Scene {
     stops,
     ruled,
     stations,
+    signals,
     detectors,
     candidates,
     step,

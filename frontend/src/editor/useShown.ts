@@ -13,6 +13,8 @@ export interface Shown {
   flows: SceneFlow[];
 }
 
+const NOBODY: ReadonlySet<string> = new Set<string>();
+
 /** What the map shows of a document; each part is made anew only when its own cause changes. */
 export function useShown(
   { graph, picker }: LoadedGraph,
@@ -23,10 +25,12 @@ export function useShown(
 ): Shown {
   const { roi, actors: placed, flows: sent } = document;
   const inside = useMemo(() => insideRows(graph, roi), [graph, roi]);
-  const starts = useMemo(
-    () => new Starts(graph, picker, inside, { actors: placed, flows: sent }),
-    [graph, picker, inside, placed, sent],
-  );
+  const starts = useMemo(() => {
+    const bodies = sceneActors(graph, { actors: placed }, assets, NOBODY, NOBODY);
+    const vehicles = bodies.filter(({ category }) => category !== "pedestrian");
+    const known = new Map(vehicles.map((body) => [body.id, body]));
+    return new Starts(graph, picker, inside, { actors: placed, flows: sent }, known);
+  }, [graph, picker, inside, placed, sent, assets]);
   const chosen = useMemo(() => new Set(selection), [selection]);
   const actors = useMemo(
     () => sceneActors(graph, { actors: placed }, assets, chosen, wrong),

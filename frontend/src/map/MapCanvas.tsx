@@ -47,6 +47,9 @@ export interface MapHandle {
   show(bounds: Bounds): void;
   /** Brings a place to the middle, or so many pixels to the left of it. */
   centre(x: number, y: number, aside?: number): void;
+  /** Brings a place to the middle at the scale that the map has, unless it is in sight already. */
+  reveal(x: number, y: number): void;
+  view(): View;
   /** The rectangle that is in sight. */
   seen(): Bounds;
   /** What is seen now, in one canvas: the given one, or a new one. */
@@ -85,6 +88,8 @@ const KEYS = localized(
 );
 const CLICK_SLACK = 4;
 const TOUCH = 14;
+/** Share of the map at each of its edges in which nothing is well in sight. */
+const EDGE = 0.06;
 
 /** The map: drag or arrow keys move it, wheel or + and - zoom, Enter acts on the middle. */
 export function MapCanvas({
@@ -203,6 +208,13 @@ export function MapCanvas({
         const scale = Math.max(view.current.scale, 8);
         apply({ x: x + aside / scale, y, scale });
       },
+      reveal: (x, y) => {
+        const [x0, y0, x1, y1] = visible(view.current, size.current);
+        const [w, h] = [EDGE * (x1 - x0), EDGE * (y1 - y0)];
+        const there = x > x0 + w && x < x1 - w && y > y0 + h && y < y1 - h;
+        if (!there) apply({ ...view.current, x, y });
+      },
+      view: () => view.current,
       picture: (into) => renderer.current?.picture(into) ?? null,
       vector: () => renderer.current?.vector(legendRows(host.current ?? document)) ?? null,
       seen: () => visible(view.current, size.current),

@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useId } from "react";
 
+import { dayTicks, hasClock, shortClock } from "../language/moments";
 import { nth } from "../lists";
 import { thinned, ticks } from "./scale";
 
@@ -20,6 +21,8 @@ interface Props {
   series: readonly Series[];
   /** Area between two values for each x, said in `series` words by its name. */
   band?: { name: string; low: readonly (number | null)[]; high: readonly (number | null)[] };
+  /** Whether x are moments of the run, which are times of day if it has a clock. */
+  moments?: boolean;
   /** Bars from each x to the next one, instead of lines; one series. */
   bars?: boolean;
   /** How to read it. */
@@ -32,13 +35,25 @@ const BOX = { left: 40, right: W - 10, top: 28, bottom: H - 34 };
 const ROWS = 24;
 
 /** A small chart with round axes; the same numbers are a table below it. */
-export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, children }: Props) {
+export function Chart({
+  title,
+  xLabel,
+  yLabel,
+  x,
+  series,
+  band,
+  bars = false,
+  moments = false,
+  children,
+}: Props) {
   const id = useId();
   const color = series[0]?.color;
   const known = [...series.flatMap((one) => one.values), ...(band?.high ?? [])].filter((v) => v !== null);
   const yTicks = ticks(Math.max(0, ...known));
-  const xTicks = ticks(x.at(-1) ?? 1, 6).filter((v) => v <= (x.at(-1) ?? 1) * 1.001);
   const [xMost, yMost] = [x.at(-1) || 1, yTicks.at(-1) ?? 1];
+  const ofDay = moments && hasClock();
+  const xTicks = ofDay ? dayTicks(0, xMost, 5) : ticks(xMost, 6).filter((v) => v <= xMost * 1.001);
+  const xWord = (v: number): string => (ofDay ? shortClock(v, xMost) : round(v));
   const px = (v: number): number => BOX.left + ((BOX.right - BOX.left) * v) / xMost;
   const py = (v: number): number => BOX.bottom - ((BOX.bottom - BOX.top) * v) / yMost;
   const point = (v: number | null | undefined, k: number): string | null =>
@@ -57,7 +72,7 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
         ))}
         {xTicks.map((v) => (
           <text key={v} x={px(v)} y={BOX.bottom + 15} textAnchor="middle">
-            {v.toLocaleString(i18n.locale)}
+            {ofDay ? shortClock(v, xMost) : v.toLocaleString(i18n.locale)}
           </text>
         ))}
         <text x={(BOX.left + BOX.right) / 2} y={H - 3} textAnchor="middle">
@@ -112,7 +127,15 @@ export function Chart({ title, xLabel, yLabel, x, series, band, bars = false, ch
         <summary>
           <Trans>{title} in numbers</Trans>
         </summary>
-        <Numbers title={title} xLabel={xLabel} yLabel={yLabel} x={x} series={series} bars={bars} />
+        <Numbers
+          title={title}
+          xLabel={xLabel}
+          yLabel={yLabel}
+          x={x}
+          series={series}
+          bars={bars}
+          xWord={xWord}
+        />
       </details>
     </figure>
   );
@@ -125,6 +148,7 @@ function Numbers({
   x,
   series,
   bars,
+  xWord,
 }: {
   title: string;
   xLabel: string;
@@ -132,6 +156,7 @@ function Numbers({
   x: readonly number[];
   series: readonly Series[];
   bars: boolean;
+  xWord: (x: number) => string;
 }) {
   const rows = x.slice(0, series[0]?.values.length).map((_, k) => k);
   return (
@@ -150,7 +175,7 @@ function Numbers({
         {(bars ? rows : thinned(rows, ROWS)).map((k) => (
           <tr key={k}>
             <th scope="row" style={{ fontWeight: 400 }}>
-              {bars ? t`${round(nth(x, k))} to ${round(nth(x, k + 1))}` : round(nth(x, k))}
+              {bars ? t`${xWord(nth(x, k))} to ${xWord(nth(x, k + 1))}` : xWord(nth(x, k))}
             </th>
             {series.map((one) => (
               <td key={one.name}>{said(one.values[k])}</td>

@@ -7,7 +7,7 @@ import { useCallback, useEffect, useState } from "react";
 import { fixed } from "../language/numbers";
 import { type FitRow, runs } from "../api/runs";
 import { useLoaded } from "../ui/useLoaded";
-import { span } from "../ui/words";
+import { span } from "../language/moments";
 import { worstFirst } from "./fit";
 import { Scatter } from "./Scatter";
 import { served } from "../language/served";

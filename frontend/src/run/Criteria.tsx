@@ -3,7 +3,7 @@ import { Button, Text, Title } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { short } from "../language/numbers";
 import type { CriterionInfo } from "../api/runs";
-import { clock } from "../ui/words";
+import { clock } from "../language/moments";
 import { i18n } from "@lingui/core";
 import { actorMeasures, allFigures } from "../api/figures";
 import { criterionWords } from "../editor/criteria";

@@ -6,7 +6,7 @@ import { Trans } from "@lingui/react/macro";
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import { MARK_COLOR } from "../map/colors";
-import { clock } from "../ui/words";
+import { clock } from "../language/moments";
 import { markKind, sentence } from "./incidents";
 
 const LISTED = 200;

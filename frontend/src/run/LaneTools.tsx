@@ -3,7 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
 import { nth } from "../lists";
-import { span as spanText } from "../ui/words";
+import { span as spanText } from "../language/moments";
 import { LANES_BY, type LanesBy, QUANTITIES } from "./laneUse";
 import type { ShownUse } from "./useLaneUse";
 

@@ -7,7 +7,8 @@ import { useState } from "react";
 import { fixed } from "../language/numbers";
 import { type RunInfo, runs, type Summary } from "../api/runs";
 import { tellError } from "../ui/notices";
-import { hoursMinutes, span } from "../ui/words";
+import { span } from "../language/moments";
+import { hoursMinutes } from "../ui/words";
 import { served } from "../language/served";
 
 /** A long run that was interrupted: how much is saved, and resuming it. */

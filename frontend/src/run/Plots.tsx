@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useCallback } from "react";
 
+import { hasClock } from "../language/moments";
 import { unitFor, toShown } from "../language/units";
 import { runs } from "../api/runs";
 import { useLoaded } from "../ui/useLoaded";
@@ -30,7 +31,8 @@ export function Plots({ run }: { run: string }) {
     <>
       <Chart
         title={t`Road users in the network`}
-        xLabel={t`Time, s`}
+        moments
+        xLabel={hasClock() ? t`Time of day` : t`Time, s`}
         yLabel={t`Road users`}
         x={counts.time}
         series={[
@@ -44,7 +46,8 @@ export function Plots({ run }: { run: string }) {
       </Chart>
       <Chart
         title={t`Arrivals`}
-        xLabel={t`Time, s`}
+        moments
+        xLabel={hasClock() ? t`Time of day` : t`Time, s`}
         yLabel={t`Arrived so far`}
         x={counts.time}
         series={[{ name: t`Arrived`, color: GREEN, values: counts.arrived }]}
@@ -55,7 +58,8 @@ export function Plots({ run }: { run: string }) {
       </Chart>
       <Chart
         title={t`Speed of vehicles`}
-        xLabel={t`Time, s`}
+        moments
+        xLabel={hasClock() ? t`Time of day` : t`Time, s`}
         yLabel={unitFor("speed").sign}
         x={speeds.time}
         series={[{ name: t`Mean`, color: BLUE, values: km(speeds.mean) }]}

@@ -102,8 +102,11 @@ export function RunMap({
     () => ({ read: () => begin ?? undefined, write: (at) => moved(id, at) }),
     [id, begin, moved],
   );
+  const brought = useRef(false);
   useEffect(() => {
-    if (bounds && !begin) handle.current?.show(bounds);
+    if (!bounds || begin || brought.current) return;
+    brought.current = true;
+    handle.current?.show(bounds);
   }, [handle, bounds, begin]);
   useEffect(() => {
     if (focus?.id === id) frame.current?.querySelector<HTMLElement>('[role="application"]')?.focus();

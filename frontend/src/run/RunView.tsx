@@ -8,6 +8,9 @@ import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import type { FitRow } from "../api/runs";
 import type { Category } from "../api/types";
 import { type LightProgram, signals } from "../api/signals";
+import { MOST_ACTORS } from "../editor/scene";
+import { around } from "../editor/sights";
+import { countFrom } from "../language/moments";
 import type { Pointed } from "../map/MapCanvas";
 import { seenInLog } from "../signals/occupancy";
 import { sceneDetectors } from "../signals/sceneDetectors";
@@ -28,7 +31,7 @@ import { RunGone } from "./RunGone";
 import { RunMap } from "./RunMap";
 import { RunSide } from "./RunSide";
 import { LiveStrip, ReplayStrip } from "./Strip";
-import { useCounts } from "./useCounts";
+import { useContent } from "./useContent";
 import { useIncidents } from "./useIncidents";
 import { useLightsAhead } from "./useLightsAhead";
 import { useLaneData } from "./useLaneUse";
@@ -37,6 +40,11 @@ import { useReplay } from "./useReplay";
 import { useViews } from "./useViews";
 import { viewName } from "./ViewButtons";
 import { useGround, useRun } from "./useRun";
+
+/** Metres around where the road users of a story have been. */
+const STORY_MARGIN = 20;
+/** Seconds of a long live run of few road users that are in sight first. */
+const STORY = 60;
 
 /** Watches one run from above; one that is resumed is watched anew. */
 export function RunView({ scenario, run }: { scenario: string; run: string }) {
@@ -77,7 +85,8 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
   if (info && mode === null) setMode(ended ? "replay" : "live");
   const player = useReplay(run, mode === "replay" && replayable, show);
   const { incidents, add } = useIncidents(run, complete);
-  const counts = useCounts(run, replayable);
+  const content = useContent(run, replayable);
+  countFrom(info?.clock ?? content?.clock ?? 0);
   const [fit, setFit] = useState<readonly FitRow[] | null>(null);
   const [tab, setTab] = useState<string | null>(null);
   const shownTab = tab ?? (ended ? "result" : "users");
@@ -126,6 +135,9 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
     if (replay) keep({ time: player.time });
   }, [replay, player.time]);
   const known = player.replay?.crowd ?? crowd;
+  const extent = useMemo(() => player.replay?.extent(), [player.replay]);
+  // The recording says where its story was.
+  const bounds = extent ? around(extent, STORY_MARGIN) : player.loading ? null : ground.bounds;
   const categories = useMemo(
     () => new Map<string, Category>(known?.all().map((one) => [one.id, one.category]) ?? []),
     [known],
@@ -201,7 +213,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                   scene={scene}
                   heads={heads}
                   marks={marks}
-                  bounds={ground.bounds}
+                  bounds={bounds}
                   sight={sight}
                   views={views}
                   picture={picture}
@@ -240,7 +252,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
           view={views.list.length > 1 ? viewName(views.list.indexOf(used) + 1, views.list.length) : null}
           incidents={incidents}
           categories={categories}
-          counts={counts}
+          counts={content?.counts ?? 0}
           onFit={setFit}
           lights={lights}
           junction={shownJunction}
@@ -266,6 +278,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
         plans={plans}
         ttc={ttc}
         spacing={player.replay?.spacing ?? 0.2}
+        first={live && longest > 2 * STORY && known && known.all().length <= MOST_ACTORS ? STORY : null}
         onSeek={player.replay ? jump : null}
         onShow={({ x, y }) => {
           if (x !== undefined && y !== undefined) place(x, y);

@@ -4,7 +4,7 @@ import { Trans } from "@lingui/react/macro";
 
 import { fromShown, speedText, toShown, unitFor } from "../language/units";
 import { nth } from "../lists";
-import { clock } from "../ui/words";
+import { clock } from "../language/moments";
 import { ticks } from "./scale";
 
 const [WIDTH, HEIGHT] = [220, 82];

@@ -7,7 +7,8 @@ import { type Action, type Incident, type RunInfo, runs, type RunState } from ".
 import { MARK_COLOR } from "../map/colors";
 import { IconBack, IconPause, IconPlay, IconStep, IconStop } from "../ui/icons";
 import { tellError } from "../ui/notices";
-import { hoursMinutes, longClock } from "../ui/words";
+import { longClock } from "../language/moments";
+import { hoursMinutes } from "../ui/words";
 import { REPLAY_SPEEDS, type Speed, SPEEDS, STATE_WORD } from "./figures";
 import { markKind } from "./incidents";
 import type { Now } from "./usePicture";

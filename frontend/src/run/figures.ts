@@ -5,7 +5,8 @@ import { preferences } from "../language/preferences";
 import { localized } from "../language/localized";
 import { served } from "../language/served";
 import { shownAs } from "../language/units";
-import { longClock, sentence } from "../ui/words";
+import { lengthOfTime } from "../language/moments";
+import { sentence } from "../ui/words";
 import type { FigureInfo } from "../api/figures";
 import type { RunState, Summary } from "../api/runs";
 
@@ -41,7 +42,7 @@ function plain(n: number, { unit, factor, digits }: FigureInfo["display"]): stri
 }
 
 const say = (n: number, { display }: FigureInfo): string =>
-  display.clock ? longClock(n, n) : plain(n, display);
+  display.clock ? lengthOfTime(n) : plain(n, display);
 const words = ({ name, label, definition }: FigureInfo) => ({
   name,
   label: sentence(served(label)),

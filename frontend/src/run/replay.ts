@@ -1,4 +1,6 @@
 import type { ReplayColumns } from "../api/runs";
+import type { Bounds } from "../api/types";
+import { MOST_ACTORS } from "../editor/scene";
 import { nth } from "../lists";
 import { Crowd, type Frame } from "./frames";
 import type { LimitOf } from "./limits";
@@ -11,6 +13,7 @@ const ROW = 6;
 export class Replay {
   readonly crowd = new Crowd();
   readonly begin: number;
+  /** When the last road user has left, or the recording ends. */
   readonly end: number;
   /** Seconds between two recorded moments. */
   readonly spacing: number;
@@ -22,8 +25,10 @@ export class Replay {
   constructor(private readonly columns: ReplayColumns) {
     const { times, x, y } = columns;
     this.begin = times[0] ?? 0;
-    this.end = times[times.length - 1] ?? 0;
-    this.spacing = times.length > 1 ? (this.end - this.begin) / (times.length - 1) : 0;
+    const last = times.length - 1;
+    this.spacing = last > 0 ? ((times[last] ?? 0) - this.begin) / last : 0;
+    // What follows once the last has arrived is an empty road.
+    this.end = times[Math.min(lastBusy(columns) + 1, last)] ?? 0;
     this.next = following(columns);
     this.stopped = stoppedSoFar(columns, this.next);
     this.crowd.origin = [Math.round(x[0] ?? 0), Math.round(y[0] ?? 0)];
@@ -70,6 +75,15 @@ export class Replay {
       );
     }
     return { step: i, time, count, pace: 0, arrived: 0, rows, stopped };
+  }
+
+  /** Where all of them have been, if they are few enough for a story; metres. */
+  extent(): Bounds | null {
+    const { actors, x, y } = this.columns;
+    if (actors.length === 0 || actors.length > MOST_ACTORS) return null;
+    const least = (of: readonly number[]): number => of.reduce((low, one) => Math.min(low, one), Infinity);
+    const most = (of: readonly number[]): number => of.reduce((high, one) => Math.max(high, one), -Infinity);
+    return [least(x), least(y), most(x), most(y)];
   }
 
   /** Speeds of a road user at all moments at which it is on the road, with limits where they are known. */
@@ -137,6 +151,12 @@ function stoppedSoFar({ times, first, speed }: ReplayColumns, next: Int32Array):
     }
   }
   return seconds;
+}
+
+/** The last moment at which there are road users; the very last one if there are none at all. */
+function lastBusy({ times, first }: ReplayColumns): number {
+  for (let i = times.length - 1; i >= 0; i--) if (nth(first, i + 1) > nth(first, i)) return i;
+  return times.length - 1;
 }
 
 function following({ first, actor, actors }: ReplayColumns): Int32Array {

@@ -10,6 +10,7 @@ import { type ReactNode, useCallback, useEffect, useRef, useState } from "react"
 import { dayTime } from "../language/units";
 import { localized } from "../language/localized";
 import type { DayPlan, LightProgram } from "../api/signals";
+import { closesList } from "../ui/lists";
 import { useLoaded } from "../ui/useLoaded";
 import { cursorAt, type Cursor, type SignalNow } from "./cursor";
 import type { SignalEditing } from "./editing";
@@ -71,7 +72,7 @@ export function SignalPanel(props: Props) {
       aria-label={t`Traffic light of junction ${junction}`}
       tabIndex={-1}
       onKeyDown={(event) => {
-        if (event.key === "Escape" && onClose) {
+        if (event.key === "Escape" && onClose && !closesList(event)) {
           event.stopPropagation();
           onClose();
         }

@@ -1,6 +1,6 @@
 import { type ReactNode, useRef } from "react";
 
-import { clock, longClock } from "../ui/words";
+import { longClock, shortClock } from "../language/moments";
 import { type Sight, ticksOf, toTime, toX } from "./sight";
 
 /** Seconds that an arrow key moves the moment, and with Shift. */
@@ -56,7 +56,7 @@ export function Axis({
           style={{ left: toX(sight, time) }}
           aria-hidden="true"
         >
-          {word(time, longest)}
+          {shortClock(time, longest)}
         </span>
       ))}
       {onMoment && label === null && there && (
@@ -102,9 +102,6 @@ function edgeOf(sight: Sight, time: number): "left" | "right" | "middle" {
   const x = toX(sight, time);
   return x < 24 ? "left" : x > sight.width - 24 ? "right" : "middle";
 }
-
-const word = (time: number, longest: number): string =>
-  longest >= 3600 ? longClock(time, longest) : clock(time).replace(/[.,]0$/, "");
 
 /** Lines through all rows: the scale, and the moment that is shown. */
 export function Lines({ sight, moment }: { sight: Sight; moment: number | null }): ReactNode {

@@ -13,7 +13,7 @@ import type { Category } from "../api/types";
 import { MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
 import { MARK_WORD, markKind, sentence } from "../run/incidents";
 import type { Shown } from "../signals/heads";
-import { clock } from "../ui/words";
+import { clock } from "../language/moments";
 import { Axis, Lines } from "./Axis";
 import { ZoomButtons } from "./ZoomButtons";
 import { panned, type Sight, toTime, toX, zoomed } from "./sight";
@@ -48,6 +48,7 @@ export function RunBar({
   plans,
   ttc,
   spacing,
+  first,
   onSeek,
   onShow,
 }: {
@@ -66,6 +67,8 @@ export function RunBar({
   ttc: EgoTtc;
   /** Seconds between two moments of the recording. */
   spacing: number;
+  /** Seconds that are in sight to begin with; null is all. */
+  first: number | null;
   /** Jumps to an instant; nothing in a live run. */
   onSeek: ((time: number) => void) | null;
   onShow: (incident: Incident) => void;
@@ -87,6 +90,9 @@ export function RunBar({
       return { ...old, begin: Math.max(0, begin) };
     });
   }, [time, seconds]);
+  useEffect(() => {
+    if (first !== null) setChosen((old) => old ?? { begin: 0, seconds: first });
+  }, [first]);
   const rules = useMemo(() => incidents.filter(isRule), [incidents]);
   const others = useMemo(() => incidents.filter((one) => !isRule(one)), [incidents]);
   const firings = useMemo(() => firingsOf(rules), [rules]);

@@ -3,7 +3,8 @@ import { t } from "@lingui/core/macro";
 import type { Actor, Edit, Flow, ScenarioDocument } from "../api/types";
 import { KIND, type Measure } from "../editor/measures";
 import { type Condition, draftOf, isGroup, type Rule, ruleOf } from "../editor/rules/draft";
-import { CATEGORY_WORD, clock, flowWord } from "../ui/words";
+import { clock } from "../language/moments";
+import { CATEGORY_WORD, flowWord } from "../ui/words";
 
 /** When something of a scenario is: seconds after the start of the run. */
 export interface Times {

@@ -1,3 +1,4 @@
+import { dayTicks, hasClock } from "../language/moments";
 import { ticks } from "../run/scale";
 
 /** The stretch of time that is in sight, and the pixels that it has. */
@@ -53,6 +54,8 @@ const TICK_PIXELS = 74;
 /** Round instants in sight. */
 export function ticksOf({ begin, seconds, width }: Sight): number[] {
   const parts = Math.max(1, Math.floor(width / TICK_PIXELS));
+  // Of long times minutes are round, not hundreds of seconds.
+  if (hasClock() || seconds > 120) return dayTicks(begin, seconds, parts);
   const round = ticks(seconds, parts);
   const step = (round[1] ?? seconds) - (round[0] ?? 0);
   const first = Math.ceil(begin / step - 1e-9);

@@ -5,7 +5,7 @@ import type { EditorNow } from "../editor/useEditing";
 import { nth } from "../lists";
 import type { Pointed } from "../map/MapCanvas";
 import type { Scene } from "../map/scene";
-import { clock } from "../ui/words";
+import { clock } from "../language/moments";
 import { type Plan, usePlanned } from "./usePlanned";
 
 export interface PlannedView {

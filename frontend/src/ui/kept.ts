@@ -96,6 +96,22 @@ export function withKept(hash: string, { at, step, chosen, time, by, lanes, othe
   return text ? `${pathOf(hash)}?${text}` : pathOf(hash);
 }
 
+/** What views were left with, by their paths: one that is opened again is as it was. */
+const left = new Map<string, Kept>();
+
+/** Gives an address that asks for nothing what its view was left with. */
+function restore(): void {
+  if (pending && pending.path !== pathOf(location.hash)) write();
+  const kept = left.get(location.hash);
+  if (kept) history.replaceState(history.state, "", withKept(location.hash, kept));
+}
+// Before any view reads the address.
+if (typeof addEventListener === "function") addEventListener("hashchange", restore);
+
+/** The address of a view that is opened with something in sight, and what was kept of it besides. */
+export const openedWith = (hash: string, kept: Kept): string =>
+  withKept(hash, { ...left.get(hash), ...kept });
+
 let pending: { path: string; kept: Kept; timer: number } | null = null;
 
 /** Keeps something of the view in its address; the history has no entry more. */
@@ -117,9 +133,11 @@ export function write(): void {
   const { path, kept, timer } = pending;
   clearTimeout(timer);
   pending = null;
+  const there = pathOf(location.hash) === path ? parseKept(location.hash) : left.get(path);
+  left.set(path, { ...there, ...kept });
   // Another view may have been opened meanwhile.
   if (pathOf(location.hash) !== path) return;
-  const next = withKept(path, { ...parseKept(location.hash), ...kept });
+  const next = withKept(path, { ...there, ...kept });
   if (next !== location.hash) history.replaceState(history.state, "", next);
 }
 

@@ -2,7 +2,6 @@ import { i18n } from "@lingui/core";
 import { plural, t } from "@lingui/core/macro";
 
 import { speedText, roughLength } from "../language/units";
-import { fixed } from "../language/numbers";
 import { localized } from "../language/localized";
 import type { Category, DrivingStyle, MapStatistics, NetworkOrigin, WeatherPreset } from "../api/types";
 import { isKey } from "../lists";
@@ -84,39 +83,12 @@ export const modelWord = (id: string): string =>
     .replace(/^0/, "Person 0")
     .replace(/\b\w/g, (c) => c.toUpperCase());
 
-export function clock(seconds: number): string {
-  const s = Math.max(0, seconds);
-  const minutes = Math.floor(s / 60);
-  return `${minutes}:${fixed(s - 60 * minutes, 1).padStart(4, "0")}`;
-}
-
 /** Hours and minutes, for times of which seconds say nothing: `1 h 05 min`. */
 export function hoursMinutes(seconds: number): string {
   const minutes = Math.round(Math.max(0, seconds) / 60);
   const [h, min] = [Math.floor(minutes / 60), minutes % 60];
   if (h === 0) return t`${min} min`;
   return min === 0 ? t`${h} h` : t`${h} h ${String(min).padStart(2, "0")} min`;
-}
-
-/** Minutes of the hour, or seconds of the minute, in two digits. */
-const sixtieth = (n: number): string => String(Math.floor(n) % 60).padStart(2, "0");
-
-/** Hours, minutes and seconds of a long run; the tenths of {@link clock} for a short one. */
-export function longClock(seconds: number, longest: number): string {
-  if (longest < 3600) return clock(seconds);
-  const s = Math.max(0, seconds);
-  return `${Math.floor(s / 3600)}:${sixtieth(s / 60)}:${sixtieth(s)}`;
-}
-
-/** From when to when after the start, in the unit that fits: `0–15 min`, `0:15–10:00 h`. */
-export function span(begin: number, end: number): string {
-  if (begin % 60 !== 0 || end % 60 !== 0) {
-    const at = (seconds: number): string => `${Math.floor(seconds / 60)}:${sixtieth(seconds)}`;
-    return t`${at(begin)}–${at(end)} min`;
-  }
-  if (end <= 3600) return t`${begin / 60}–${end / 60} min`;
-  const at = (seconds: number): string => `${Math.floor(seconds / 3600)}:${sixtieth(seconds / 60)}`;
-  return t`${at(begin)}–${at(end)} h`;
 }
 
 export function bytes(n: number): string {

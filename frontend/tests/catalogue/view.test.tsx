@@ -48,6 +48,33 @@ test("without maps the example maps are offered", async () => {
   expect(screen.getByText("None yet. Choose a map above, or open a scenario file.")).toBeTruthy();
 });
 
+const entryOf = (name: string, modified: number, title = name) => ({
+  name,
+  title,
+  map: "Town",
+  actors: 3,
+  modified,
+  error: null,
+});
+
+test("own scenarios come first, the newest at the top, and two of one title are told apart", async () => {
+  const many = Array.from({ length: 9 }, (_, n) =>
+    entryOf(`Town-${n}`, 100 + n, n < 2 ? "Town" : `Trip ${n}`),
+  );
+  server({ "/broken-maps": [], "/scenarios": many, "/maps": [mapInfo("Town", 9)] });
+  const { user } = show(<CatalogueView />);
+  const table = await screen.findByRole("table", { name: "Your scenarios" });
+  const headings = screen.getAllByRole("heading").map((one) => one.textContent);
+  expect(headings.indexOf("Your scenarios")).toBeLessThan(headings.indexOf("Choose a map"));
+  expect(rowsOf(table).map(([title]) => title)).toEqual([8, 7, 6, 5, 4, 3].map((n) => `Trip ${n}`));
+  await user.click(screen.getByRole("button", { name: "Show all 9 scenarios" }));
+  expect(
+    rowsOf(table)
+      .map(([title]) => title)
+      .slice(-2),
+  ).toEqual(["TownTown-1", "TownTown-0"]);
+});
+
 const ITEM = { id: "map-1", kind: "map", name: "Town", removed: 1.8e9, until: 1.8e9 + 2_592_000 };
 
 test("the example maps can be added when there are maps already", async () => {

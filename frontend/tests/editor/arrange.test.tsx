@@ -4,10 +4,11 @@ import { expect, test, vi } from "vitest";
 
 import { ArrangeForm } from "../../src/editor/ArrangeForm";
 import { abreast, evenly, inTurn } from "../../src/editor/arrange";
-import { Starts } from "../../src/editor/placing";
+import type { Actor } from "../../src/api/types";
+import { type Body, overlap, Starts } from "../../src/editor/placing";
 import { Graph } from "../../src/map/graph";
 import { Picker } from "../../src/map/picking";
-import { actor, columns, scenario } from "../example";
+import { actor, columns, place, scenario } from "../example";
 import { fill, show } from "../page";
 
 /** Two lanes of nine nodes each, 2 m apart. */
@@ -74,4 +75,42 @@ test("what is arranged is one change each", async () => {
       "Departures of 3 road users",
     ],
   ]);
+});
+
+/** Bodies of 4.5 m by 1.8 m where road users of a street start. */
+const bodies = (actors: readonly Actor[]): Map<string, Body> =>
+  new Map(
+    actors.map(({ id, spawn }) => {
+      const { x, y, hdg } = street.place(spawn) ?? { x: 0, y: 0, hdg: 0 };
+      return [id, { x, y, hdg, length: 4.5, width: 1.8 }];
+    }),
+  );
+
+test("a start is where the body has room, and what is copied keeps all, be it further away", () => {
+  const ones = [actor("a", "1.0.-1.0"), actor("b", "1.0.-1.4")];
+  const starts = new Starts(street, new Picker(street), new Set([0]), scenario(ones), bodies(ones));
+  // Without a size the next node is free; with one the other lane is, where no body lies over another.
+  expect(starts.near(2, 0, 1, false)?.id).toBe("1.0.-1.1");
+  const found = starts.near(2, 0, 1, false, { size: [4.5, 1.8] });
+  expect(found?.id).toBe("1.0.-2.1");
+  expect(found && starts.beyond(2, 0, 1, found)).toBeCloseTo(3);
+  expect(found && starts.shifted(ones, found)).toEqual([
+    ["a", "1.0.-2.1"],
+    ["b", "1.0.-2.5"],
+  ]);
+  const apart = [actor("a", "1.0.-1.0"), actor("b", "1.0.-1.8")];
+  const far = new Starts(street, new Picker(street), new Set([0]), scenario(apart), bodies(apart));
+  // Where the second belongs, 14 m beyond the end of the road, there is nothing.
+  expect(far.shifted(apart, street.place("1.0.-2.7") ?? place("1.0.-1.0"))).toEqual([
+    ["a", "1.0.-2.7"],
+    ["b", "1.0.-1.5"],
+  ]);
+});
+
+test("bodies lie over each other by their headings, lengths and widths", () => {
+  const body = { x: 0, y: 0, hdg: 0, length: 4, width: 2 };
+  expect(overlap(body, { ...body, x: 4.4 })).toBe(true); // half a metre is kept free
+  expect(overlap(body, { ...body, x: 4.6 })).toBe(false);
+  expect(overlap(body, { ...body, y: 3.5 })).toBe(false);
+  expect(overlap(body, { ...body, y: 3.3, hdg: Math.PI / 2 })).toBe(true);
 });

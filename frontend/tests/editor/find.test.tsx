@@ -2,6 +2,7 @@
 import { screen } from "@testing-library/react";
 import { expect, test, vi } from "vitest";
 
+import { commandsOf } from "../../src/editor/commands";
 import { findAll } from "../../src/editor/find";
 import { FindDialog } from "../../src/editor/FindDialog";
 import { Graph } from "../../src/map/graph";
@@ -30,8 +31,8 @@ test("roads, junctions and road users are found by id and by kind, the exact one
 
 test("what is found is chosen with arrow keys and Enter, or by a click", async () => {
   const [onGo, onClose] = [vi.fn(), vi.fn()];
-  const { user } = show(<FindDialog graph={town} ones={ones} onGo={onGo} onClose={onClose} />);
-  const field = await screen.findByRole("combobox", { name: "Name" });
+  const { user } = show(<FindDialog graph={town} ones={ones} commands={[]} onGo={onGo} onClose={onClose} />);
+  const field = await screen.findByRole("combobox", { name: /^Name of a place/ });
   await user.type(field, "1{ArrowDown}{ArrowDown}{ArrowUp}{Enter}");
   expect(onGo).toHaveBeenCalledWith({ is: "segment", id: "j1", kind: "Junction" });
   expect(onClose).toHaveBeenCalledOnce();
@@ -41,8 +42,44 @@ test("what is found is chosen with arrow keys and Enter, or by a click", async (
 
 test("a search that finds nothing says so, and Enter then does nothing", async () => {
   const onGo = vi.fn();
-  const { user } = show(<FindDialog graph={graph} ones={[]} onGo={onGo} onClose={vi.fn()} />);
-  await user.type(await screen.findByRole("combobox", { name: "Name" }), "nowhere{Enter}");
+  const { user } = show(<FindDialog graph={graph} ones={[]} commands={[]} onGo={onGo} onClose={vi.fn()} />);
+  await user.type(await screen.findByRole("combobox", { name: /^Name of a place/ }), "nowhere{Enter}");
   expect(screen.getByText(/is called “nowhere”/)).toBeTruthy();
   expect(onGo).not.toHaveBeenCalled();
+});
+
+test("every action is found by its name, with its keys, and done with Enter", async () => {
+  const act = (): void => undefined;
+  const doings = {
+    run: vi.fn(),
+    undo: vi.fn(),
+    redo: act,
+    openStep: vi.fn(),
+    place: vi.fn(),
+    placeFlow: vi.fn(),
+    selectAll: act,
+    showAll: act,
+    showRegion: act,
+    runs: act,
+    studies: act,
+    sweeps: act,
+    catalogue: act,
+    help: act,
+    tour: act,
+  };
+  const commands = commandsOf(doings, [["lights", "Traffic lights"]]);
+  const { user } = show(
+    <FindDialog graph={town} ones={ones} commands={commands} onGo={vi.fn()} onClose={vi.fn()} />,
+  );
+  // Without a search all that can be done is listed.
+  expect(screen.getAllByRole("option")).toHaveLength(commands.length);
+  const field = await screen.findByRole("combobox", { name: /^Name of a place/ });
+  await user.type(field, "open lights{Enter}");
+  expect(doings.openStep).toHaveBeenCalledExactlyOnceWith("lights");
+  await user.clear(field);
+  await user.type(field, "place bus{Enter}");
+  expect(doings.place).toHaveBeenCalledExactlyOnceWith("bus");
+  await user.clear(field);
+  await user.type(field, "run");
+  expect(screen.getByRole("option", { name: /Run the scenario/ }).textContent).toContain("Ctrl+Enter");
 });

@@ -16,6 +16,7 @@ import { insideRows, sceneActors, sceneFlows, type Step } from "../../src/editor
 import { inBounds, inCircle, inRing } from "../../src/map/areas";
 import type { Pointed } from "../../src/map/MapCanvas";
 import { Picker } from "../../src/map/picking";
+import type { AskedRemoval } from "../../src/editor/uses";
 import { Heads } from "../../src/signals/heads";
 import { actor, flow, graph, place, scenario } from "../example";
 
@@ -27,6 +28,7 @@ class Log {
   steps: Step[] = [];
   selected: (readonly string[])[] = [];
   lights: string[] = [];
+  asked: AskedRemoval[] = [];
   done = 0;
 }
 
@@ -52,6 +54,7 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
     roi: document.roi,
     ones,
     starts,
+    sizeOf: () => [4, 1.8],
     region: { inside: document.roi, candidates: [], removable: document.roi, current: true },
     actors: sceneActors(graph, document, null, none, none),
     flows: sceneFlows(graph, document, none, none),
@@ -65,8 +68,10 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
       graph,
       roi: document.roi,
       ones,
+      document,
       starts,
       say: (text) => log.said.push(text),
+      ask: (removal) => log.asked.push(removal),
       edit: (edit, label) => {
         log.edits.push(edit);
         log.labels.push(label);
@@ -84,6 +89,24 @@ function editing(document: ScenarioDocument, log: Log, more: Partial<Editing> = 
     ...more,
   };
 }
+
+/** A traffic light of junction 10 with its head at a place. */
+const lightAt = (x: number, y: number): Heads =>
+  new Heads([
+    {
+      id: "J1",
+      names: ["10"],
+      green: [],
+      signals: [],
+      paths: [
+        [
+          [x, y],
+          [x + 1, y],
+        ],
+      ],
+      walks: [false],
+    },
+  ]);
 
 const at = (x: number, y: number, shift = false): Pointed => ({ x, y, reach: 0.5, shift });
 /** Centred on its lane, so that it is found where its start is. */
@@ -122,7 +145,32 @@ test("a segment that holds the region together says so before it is clicked", ()
     "region",
   );
   expect(handler.hint(handler.under(at(2, 0)))).toContain("holds the region together");
-  expect(handler.hint(handler.under(at(4, 0)))).toBeNull();
+  expect(handler.hint(handler.under(at(4, 0)))).toBe("Click to take this segment out of the region");
+});
+
+test("a click on a signal inside the region shows its program and takes nothing out of the region", () => {
+  const { x, y } = place(FIRST);
+  const lights = lightAt(x, y);
+  const { log, handler } = using(null, scenario([], ["a"]), { lights }, "region");
+  expect(handler.hint(handler.under(at(x, y)))).toBe(
+    "Traffic light of junction 10: click to see its program",
+  );
+  handler.pick(at(x, y));
+  expect([log.edits, log.lights, log.steps]).toEqual([[], ["10"], ["lights"]]);
+  // Away from the signal it is said what a click would do; outside the region a signal stops no click.
+  expect(handler.hint({ is: "segment", row: 0 })).toBe("Click to take this segment out of the region");
+  const outside = using(null, scenario([], ["c"]), { lights }, "region");
+  outside.handler.pick(at(x, y));
+  expect([outside.log.edits, outside.log.lights]).toEqual([[{ kind: "grow_roi", segment: "a" }], []]);
+});
+
+test("in the step of the lights a click anywhere on a junction shows its program", () => {
+  const { x, y } = place(FIRST);
+  const { log, handler } = using(null, scenario([], ["a"]), { lights: lightAt(x, y) }, "lights");
+  handler.pick(at(x + 25, y));
+  handler.pick(at(x + 900, y));
+  expect(log.lights).toEqual(["10"]);
+  expect(handler.hint(null)).toBe("Click a junction with a traffic light to see its program");
 });
 
 test("a rectangle in the step of the region adds what lies in it and hangs together", () => {
@@ -227,7 +275,7 @@ test("a copy is made once and does not take goals for places", () => {
   expect(log).toMatchObject({ labels: ["Copy a"], done: 1 });
 });
 
-test("of several that are moved those that find no free start are left out, and it is said", () => {
+test("of several that are moved those that find no free start in the region are left out, and it is said", () => {
   const flows = [flow("f", "ped.1.0.3.0")];
   const free = using(moveTool(["a", "f"]), scenario([car("a", FIRST)], ["a", "b"], flows));
   free.handler.pick(at(2.1, 0));
@@ -243,7 +291,7 @@ test("of several that are moved those that find no free start are left out, and 
   full.handler.pick(at(2.1, 0));
   expect(full.log).toMatchObject({
     edits: [[a]],
-    said: ["1 road user found no free point there and was left out."],
+    said: ["1 road user found no free point in the region and was left out."],
   });
 });
 
@@ -427,8 +475,45 @@ test("a drag takes a road user to a free start, and those that are selected with
   ]);
 });
 
+test("a drag that begins on a road user that is not selected moves the map, not the road user", () => {
+  const { handler } = using(null, scenario([car("a", FIRST)]));
+  expect(handler.grab(at(0, 0))).toBeNull();
+  const other = using(null, scenario([car("a", FIRST)]), { selection: ["b"] });
+  expect(other.handler.grab(at(0, 0))).toBeNull();
+});
+
+test("a road user that rules and criteria are about is removed with them or without, once that is said", () => {
+  const rule = {
+    id: "brake",
+    actor: "b",
+    when: { kind: "ttc", to: "a", below: 3 },
+    then: [{ kind: "stop" }],
+  };
+  const other = { ...rule, id: "else", when: { kind: "time", after: 3 } };
+  const document = {
+    ...scenario([car("a", FIRST), car("b", SECOND)]),
+    rules: [rule, other] as never,
+    criteria: ["min_ttc(a) >= 1.5 s", "collisions == 0"],
+  };
+  const { log } = using(null, document);
+  const { changes } = editing(document, log);
+  changes.remove(["a"]);
+  expect(log.edits).toEqual([]);
+  expect(log.asked).toEqual([{ ids: ["a"], uses: { rules: ["brake"], criteria: [0] } }]);
+  changes.remove(["a"], log.asked[0]?.uses);
+  changes.remove(["a"], { rules: [], criteria: [] });
+  expect(log.edits).toEqual([
+    [
+      { kind: "remove_actors", actors: ["a"] },
+      { kind: "remove_rule", rule: "brake" },
+      { kind: "set_criteria", criteria: ["collisions == 0"] },
+    ],
+    [{ kind: "remove_actors", actors: ["a"] }],
+  ]);
+});
+
 test("a road user that is dropped where none can start stays, and the reason is said", () => {
-  const { log, handler } = using(null, scenario([car("a", FIRST)]));
+  const { log, handler } = using(null, scenario([car("a", FIRST)]), { selection: ["a"] });
   handler.grab(at(0, 0))?.drop(at(900, 900));
   expect(log.edits).toEqual([]);
   expect(log.said).toHaveLength(1);
@@ -459,21 +544,7 @@ test("the same tool is known again, and only one that makes something new clears
 test("a click on a traffic light shows its program, unless something is placed or stands there", () => {
   const log = new Log();
   const { x, y } = place(FIRST);
-  const lights = new Heads([
-    {
-      id: "J1",
-      names: ["10"],
-      green: [],
-      signals: [],
-      paths: [
-        [
-          [x, y],
-          [x + 1, y],
-        ],
-      ],
-      walks: [false],
-    },
-  ]);
+  const lights = lightAt(x, y);
   const free = editing(scenario([]), log, { lights });
   const handler = handlerFor("traffic", null, free);
   expect(handler.hint(handler.under(at(x, y)))).toBe(

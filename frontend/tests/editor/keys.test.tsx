@@ -17,6 +17,7 @@ function listening() {
     escape: vi.fn(),
     sheet: vi.fn(),
     find: vi.fn(),
+    run: vi.fn(),
     copy: vi.fn(),
     move: vi.fn(),
     paste: vi.fn(),
@@ -33,7 +34,7 @@ function listening() {
 
 test("shortcuts do what the help says", async () => {
   const { actions, user, unmount } = listening();
-  await user.keyboard("{Control>}zyacvk{/Control}{Delete}{Escape}?mgwl,.19");
+  await user.keyboard("{Control>}zyacvk{Enter}{/Control}{Delete}{Escape}?mgwl,.19");
   const { tool, along, ...others } = actions;
   for (const [name, act] of Object.entries(others)) expect(act, name).toHaveBeenCalledOnce();
   expect(along.mock.calls).toEqual([[-1], [1]]);

@@ -11,7 +11,10 @@ import { RegionStep } from "../../src/editor/MapSteps";
 import { Starts } from "../../src/editor/placing";
 import { Problems } from "../../src/editor/Problems";
 import { RoadUserTable } from "../../src/editor/RoadUserTable";
+import { LightsStep } from "../../src/editor/LightsStep";
+import { useRunChoices } from "../../src/editor/runChoices";
 import { RunStep } from "../../src/editor/RunStep";
+import type { RunWish } from "../../src/api/runs";
 import { insideRows, STEPS } from "../../src/editor/scene";
 import { type StepText, Steps } from "../../src/editor/Steps";
 import { createEditorStore } from "../../src/editor/store";
@@ -161,12 +164,13 @@ test("only the open step shows its form; every step can be opened at any time", 
         region: text("Region", false),
         environment: text("Weather and time", false),
         actors: text("Road users", false),
-        traffic: text("Traffic", false),
+        traffic: text("Demand", false),
         transit: text("Public transport", false),
+        lights: text("Traffic lights", false),
         measures: text("Measures", false),
         rules: text("Rules", false),
         parameters: text("Parameters", false),
-        study: text("Study", false),
+        study: text("Analysis", false),
         criteria: text("Criteria", false),
         run: text("Run", false),
       }}
@@ -174,6 +178,9 @@ test("only the open step shows its form; every step can be opened at any time", 
   );
   expect(screen.getAllByText(/^form of/).map((one) => one.textContent)).toEqual(["form of Region"]);
   expect(screen.getAllByRole("button", { expanded: false })).toHaveLength(STEPS.length - 1);
+  const control = screen.getByRole("group", { name: "Control" });
+  const steps = within(control).getAllByRole("region");
+  expect(steps.map((one) => one.getAttribute("aria-label"))).toEqual(["Traffic lights", "Measures", "Rules"]);
   await user.click(within(screen.getByRole("region", { name: "Run" })).getByRole("button"));
   expect(onOpen).toHaveBeenCalledWith("run");
 });
@@ -360,7 +367,14 @@ const SIMULATORS = ["sumo", "carla-mirror", "carla-native", "steady"].map((name)
 }));
 const CARLA = { state: "absent", address: "", message: "No CARLA server is there." };
 
-function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunStep>[0]> = {}) {
+type RunProps = Omit<Parameters<typeof RunStep>[0], "choices" | "onRun"> & { onRun: (wish: RunWish) => void };
+
+function ChosenRun({ onRun, ...props }: RunProps) {
+  const choices = useRunChoices(props.name, props.document.simulation.duration);
+  return <RunStep {...props} choices={choices} onRun={() => onRun(choices.started)} />;
+}
+
+function toRun(document: ScenarioDocument, more: Partial<RunProps> = {}) {
   server({
     "/carla": CARLA,
     "/behaviours": BEHAVIOURS,
@@ -371,17 +385,15 @@ function toRun(document: ScenarioDocument, more: Partial<Parameters<typeof RunSt
   });
   const [onEdit, onRun] = [vi.fn(), vi.fn()];
   const shown = show(
-    <RunStep
+    <ChosenRun
       name="s"
       version={1}
       document={document}
-      lights
       blocked={false}
       empty={false}
       busy={false}
       onEdit={onEdit}
       onRun={onRun}
-      onLights={vi.fn()}
       {...more}
     />,
   );
@@ -465,26 +477,21 @@ test("a run begins in real time with its trajectories, unless another choice is 
   expect(await screen.findByText("CARLA not connected")).toBeTruthy();
 });
 
-test("signals are fixed-time or actuated; a map without them asks nothing", async () => {
-  const { user, onEdit, again } = toRun(scenario([actor("a")]));
+test("lights are chosen by their junction, fixed-time or actuated; a map without them says so", async () => {
+  const [onEdit, onShow] = [vi.fn(), vi.fn()];
+  const step = (junctions: readonly string[]) => (
+    <LightsStep junctions={junctions} shown="7" control="fixed" onEdit={onEdit} onShow={onShow} />
+  );
+  const { user, again } = show(step(["5", "7"]));
+  expect(screen.getByRole("button", { name: "Junction 7" }).getAttribute("aria-pressed")).toBe("true");
+  await user.click(screen.getByRole("button", { name: "Junction 5" }));
+  expect(onShow).toHaveBeenCalledExactlyOnceWith("5");
   expect(screen.getByText("Every signal keeps its times.")).toBeTruthy();
   await user.click(screen.getByRole("radio", { name: "Actuated" }));
   expect(onEdit).toHaveBeenCalledWith({ kind: "set_signal_control", control: "actuated" });
-  again(
-    <RunStep
-      name="s"
-      version={1}
-      document={scenario([])}
-      lights={false}
-      blocked={false}
-      empty
-      busy={false}
-      onEdit={onEdit}
-      onRun={vi.fn()}
-      onLights={vi.fn()}
-    />,
-  );
+  again(step([]));
   expect(screen.queryByRole("radiogroup", { name: "Signal control" })).toBeNull();
+  expect(screen.getByText("This map has no traffic lights.")).toBeTruthy();
 });
 
 test("another random seed is a change; the same one is none", async () => {
@@ -507,17 +514,15 @@ test("an empty scenario, or one with errors, cannot be run and says why", () => 
   expect(screen.getByRole("button", { name: "Run" })).toHaveProperty("disabled", true);
   expect(screen.getByText(/There are no road users yet/)).toBeTruthy();
   again(
-    <RunStep
+    <ChosenRun
       name="s"
       version={1}
       document={scenario([])}
-      lights
       blocked
       empty={false}
       busy={false}
       onEdit={vi.fn()}
       onRun={vi.fn()}
-      onLights={vi.fn()}
     />,
   );
   expect(screen.getByRole("button", { name: "Run" })).toHaveProperty("disabled", true);

@@ -27,6 +27,7 @@ const info = (state: RunState, more: Partial<RunInfo> = {}): RunInfo => ({
   progress: null,
   summary: null,
   preparing: null,
+  clock: null,
   error: null,
   finished: null,
   carla: false,

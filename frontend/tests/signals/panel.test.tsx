@@ -140,3 +140,19 @@ test("what the server refuses is said, and Escape closes", async () => {
   await user.keyboard("{Escape}");
   expect(onClose).toHaveBeenCalledTimes(1);
 });
+
+test("Escape in the list of junctions closes that list, and the next one the panel", async () => {
+  const onClose = vi.fn();
+  const load = () => Promise.reject(new Error("no program"));
+  const { user } = show(
+    <SignalPanel junctions={["10", "12"]} junction="10" onJunction={vi.fn()} load={load} onClose={onClose} />,
+  );
+  await screen.findByText("no program");
+  await user.click(screen.getByRole("textbox", { name: "Traffic light of junction" }));
+  expect(screen.getByRole("option", { name: "12" })).toBeTruthy();
+  await user.keyboard("{Escape}");
+  expect(screen.queryByRole("option", { name: "12" })).toBeNull();
+  expect(onClose).not.toHaveBeenCalled();
+  await user.keyboard("{Escape}");
+  expect(onClose).toHaveBeenCalledTimes(1);
+});

@@ -90,6 +90,7 @@ function bar(time: number, live = false) {
         history={{ times: [0, 30], states: ["Gr", "rG"] }}
         ttc={{ ego: "car-1", points: [{ time: 15, ttc: 2.04, other: "van-2" }], learn: () => undefined }}
         spacing={0.5}
+        first={null}
         onSeek={live ? null : calls.onSeek}
         onShow={calls.onShow}
       />,
@@ -139,6 +140,7 @@ test("the bar of a run shows less time by its buttons, and what is shown stays i
       history={null}
       ttc={{ ego: null, points: [], learn: () => undefined }}
       spacing={0.5}
+      first={null}
       onSeek={onSeek}
       onShow={vi.fn()}
     />

@@ -30,5 +30,8 @@ test("a drag snaps to round steps of some pixels", () => {
 
 test("ticks are round and in sight", () => {
   expect(ticksOf(SIGHT)).toEqual([20, 40, 60, 80, 100]);
+  expect(ticksOf({ begin: 0, seconds: 600, width: 900 })).toEqual([
+    0, 60, 120, 180, 240, 300, 360, 420, 480, 540, 600,
+  ]);
   expect(ticksOf({ begin: 3, seconds: 4, width: 300 })).toEqual([3, 4, 5, 6, 7]);
 });

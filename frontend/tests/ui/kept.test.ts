@@ -2,7 +2,7 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 
 import { parseAddress } from "../../src/ui/address";
-import { keep, parseKept, withKept, write } from "../../src/ui/kept";
+import { keep, openedWith, parseKept, withKept, write } from "../../src/ui/kept";
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -59,4 +59,20 @@ test("what one view is to keep does not end up in the address of the next", () =
   keep({ time: 5 });
   vi.runAllTimers();
   expect(location.hash).toBe("#/run/s/r?time=5.0");
+});
+
+test("a view that is opened again has what it was left with, and a link what it asks for", () => {
+  keep({ step: "rules", at: { x: 10, y: 20, scale: 4 } });
+  location.hash = "#/run/a%3Fb/r1";
+  dispatchEvent(new Event("hashchange"));
+  keep({ time: 3 });
+  location.hash = "#/edit/a%3Fb";
+  dispatchEvent(new Event("hashchange"));
+  expect(parseKept(location.hash)).toEqual({ step: "rules", at: { x: 10, y: 20, scale: 4 } });
+  location.hash = "#/edit/a%3Fb?step=run";
+  dispatchEvent(new Event("hashchange"));
+  expect(parseKept(location.hash)).toEqual({ step: "run" });
+  expect(openedWith("#/run/a%3Fb/r2", { at: { x: 10, y: 20, scale: 4 } })).toBe(
+    "#/run/a%3Fb/r2?at=10.00,20.00,4",
+  );
 });

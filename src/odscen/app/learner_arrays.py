@@ -11,14 +11,14 @@ from odscen.scenario.forms.array_reading import from_arrays
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from odscen.base.given_arrays import Array
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
 
 
-def scenario_arrays(workspace: Workspace, scenario: Scenario | Path) -> dict[str, Array]:
+def scenario_arrays(workspace: Workspace, scenario: Scenario | GivenPath) -> dict[str, Array]:
     """Write a scenario and the graphs of its map as arrays.
 
     Parameters

@@ -12,7 +12,7 @@ from odscen.app.generators import placer_of
 from odscen.app.maps import map_of
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import InputError, ScenarioError, in_file
-from odscen.base.given_files import read_given_text
+from odscen.base.given_files import as_path, read_given_text
 from odscen.scenario.document.json_form import content_sha256
 from odscen.scenario.document.scenario_document import Variant
 from odscen.scenario.edits.edit_messages import read_edit
@@ -20,9 +20,9 @@ from odscen.scenario.edits.edit_registry import EDIT_ENTRIES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.edits.edit_messages import EditBase
@@ -47,7 +47,7 @@ def apply_edit(edit: EditBase, scenario: Scenario, loaded: LoadedMap) -> Scenari
     return function(scenario, **ours, **edit.arguments)
 
 
-def read_edits(path: Path) -> list[EditBase]:
+def read_edits(path: GivenPath) -> list[EditBase]:
     """Read edits from a JSON file: a list of them, or one.
 
     Raises
@@ -57,6 +57,7 @@ def read_edits(path: Path) -> list[EditBase]:
     ScenarioError
         If an edit cannot be read; names its place in the list.
     """
+    path = as_path(path)
     try:
         data = from_json(read_given_text(path))
     except ValueError as error:
@@ -98,7 +99,7 @@ def edits_of_settings(settings: Iterable[str]) -> list[EditBase]:
 
 
 def make_variant(
-    workspace: Workspace, parent: Path, edits: Iterable[EditBase], *, name: str
+    workspace: Workspace, parent: GivenPath, edits: Iterable[EditBase], *, name: str
 ) -> Scenario:
     """Make a scenario of another one by edits, all of them or none.
 

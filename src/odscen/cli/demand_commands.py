@@ -148,7 +148,7 @@ def import_(
     store = Workspace.open(workspace)
     document = scenarios.read_scenario(scenario)
     common: dict[str, Any] = {"mix": parse_mix(mix)} if mix else {}
-    tables = {
+    tables: dict[demands.TableKind, Path | None] = {
         "zones": zones,
         "profile": profile,
         "inputs": inputs,

@@ -29,7 +29,7 @@ from odscen.cli.scenario_commands import ScenarioArgument
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from odscen.experiments.search import SearchResult
+    from odscen.experiments.searches import SearchResult
     from odscen.experiments.sweeps import Sweep
     from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
@@ -286,8 +286,8 @@ def search(
     whether there are critical cases or not; 2: bad input; 3: a run failed.
     """
     from odscen.app import scenarios
-    from odscen.experiments.search import SearchSettings
-    from odscen.experiments.search import search as find
+    from odscen.experiments.searches import SearchSettings
+    from odscen.experiments.searches import search as find
     from odscen.experiments.sweeps import SweepSettings
     from odscen.maps.store import Workspace
     from odscen.scenario.sweeps.sweep_plan import axis_from_text

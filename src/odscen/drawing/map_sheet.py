@@ -8,8 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from odscen.base.errors import MissingDependencyError
+from odscen.base.errors import InputError, MissingDependencyError
+from odscen.base.given_files import as_path
 from odscen.base.markup import Markup, element, join, number
+from odscen.base.text_files import write_file, write_text
 from odscen.drawing.legend import INK, RenderOptions, legend, legend_entries, place_entries
 from odscen.drawing.palette import FONT
 from odscen.drawing.svg_layers import (
@@ -22,8 +24,10 @@ from odscen.drawing.svg_layers import (
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
 
     from odscen.base.arrays import Bounds
+    from odscen.base.given_files import GivenPath
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.drawing.svg_layers import PlaceMarks
     from odscen.lanegraph.graphs import MapGraph
@@ -272,6 +276,54 @@ def _draw_north_arrow(x: float, y: float) -> Markup:
     right = element("path", d=data, fill=_PAPER)
     arrow = element("g", left, right, fill=INK, stroke=INK, stroke_linejoin="round")
     return arrow + _draw_text(x, y + 34, "N", size=13, font_weight="700", text_anchor="middle")
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Picture:
+    """A drawing that notebooks show, and that can be saved.
+
+    Attributes
+    ----------
+    svg
+        The whole SVG document; it has no scripts, and nothing in it is from elsewhere.
+    """
+
+    svg: str
+
+    def __repr__(self) -> str:
+        return f"<Picture: SVG of {len(self.svg) / 1000:.0f} kB>"
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+    def save(self, path: GivenPath) -> Path:
+        """Write it to a file.
+
+        Parameters
+        ----------
+        path
+            With ``.svg``, or ``.png`` (2,400 pixels wide).
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InputError
+            If the file has another ending.
+        MissingDependencyError
+            If a PNG is wanted without ``odscen[png]``.
+        WorkspaceError
+            If it cannot be written.
+        """
+        file = as_path(path)
+        if file.suffix == ".svg":
+            return write_text(file, self.svg)
+        if file.suffix == ".png":
+            return write_file(file, svg_to_png(self.svg))
+        raise InputError("a picture is a file .svg or .png", file=str(file))
 
 
 def svg_to_png(svg: str, *, width: int = 2400) -> bytes:

@@ -17,7 +17,7 @@ from odscen.reports.report_words import stretch
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from odscen.experiments.compare import Row, RunComparison, RunSet
+    from odscen.experiments.comparisons import Row, RunComparison, RunSet
     from odscen.experiments.place_map import PlaceStyles
     from odscen.reports.report_maps import PlaceShapes
 

@@ -23,6 +23,7 @@ from odscen.base.atomic_folders import new_folder
 from odscen.base.checksums import SUMS_FILE, check_files, digest, file_digest, write_sums
 from odscen.base.errors import ConflictError, InputError, in_file
 from odscen.base.folder_locks import locked
+from odscen.base.given_files import as_path, is_path
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_file, write_text
 from odscen.experiments.plan import StudyPlan, found_sources, grid_of, read_plan_data
@@ -34,7 +35,7 @@ from odscen.experiments.table import (
     refuse_taken_names,
     study_figures,
 )
-from odscen.experiments.work import versions
+from odscen.experiments.work import LocalExecutor, versions
 from odscen.figures.measures.usability import UsabilityLevel
 from odscen.formats.scenarionet_format import pickled
 from odscen.records.outcomes import RunStatus
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.base.given_files import GivenPath
     from odscen.experiments.plan import StudyGrid
     from odscen.experiments.table import Limit
     from odscen.experiments.work import Executor, Outcome
@@ -258,7 +260,7 @@ class DatasetPlan(Part):
                 raise InputError(f"splits: no pattern matches map {name!r}")
 
 
-def read_dataset_plan(file: Path) -> DatasetPlan:
+def read_dataset_plan(file: GivenPath) -> DatasetPlan:
     """Read a plan, JSON or TOML.
 
     Raises
@@ -268,6 +270,7 @@ def read_dataset_plan(file: Path) -> DatasetPlan:
     ScenarioError
         With every problem of it.
     """
+    file = as_path(file)
     data = read_plan_data(file)
     with in_file(str(file)):
         return validated(DatasetPlan, data)
@@ -413,19 +416,31 @@ CARD_FILE: Final = "README.md"
 
 def make_dataset(
     workspace: Workspace,
-    plan: DatasetPlan,
-    out: Path,
-    executor: Executor,
+    plan: DatasetPlan | GivenPath,
+    out: GivenPath,
+    executor: Executor | None = None,
     *,
-    beside: Path,
+    beside: GivenPath | None = None,
+    processes: int = 1,
     done: Callable[[int, int], None] | None = None,
 ) -> DatasetFacts:
     """Make a dataset, or what is missing of it; a complete one stays as it is.
 
     Parameters
     ----------
+    workspace
+        Has the maps.
+    plan
+        The plan, or its file, JSON or TOML.
+    out
+        Folder of the dataset.
+    executor
+        What carries out the runs; this machine if not given.
     beside
-        Folder that files of the plan are relative to.
+        Folder that files of the plan are relative to; that of its file, else the working directory,
+        if not given.
+    processes
+        How many run at a time on this machine.
     done
         Called with how many of how many runs have ended.
 
@@ -436,6 +451,11 @@ def make_dataset(
     ConflictError
         If another dataset is in the folder, or another process works there.
     """
+    if is_path(plan):
+        beside = as_path(plan).parent if beside is None else beside
+        plan = read_dataset_plan(plan)
+    out, beside = as_path(out), as_path("." if beside is None else beside)
+    executor = executor or LocalExecutor(workspace, processes)
     with disk_errors(f"dataset {out}"), locked(out, what=f"dataset {out.name!r}"):
         if (out / SUMS_FILE).is_file():
             check_files(out)

@@ -22,7 +22,7 @@ from pydantic_core import from_json
 
 from odscen.app.scenarios import read_scenario, scenario_name
 from odscen.base.errors import ConflictError, InputError, in_file
-from odscen.base.given_files import read_given_text
+from odscen.base.given_files import as_path, read_given_text
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.document_parts import Label, Part
@@ -36,6 +36,7 @@ from odscen.scenario.sweeps.sweep_plan import plan_from_data
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.sweeps.sweep_plan import SweepPlan
 
@@ -205,7 +206,7 @@ def read_plan_data(file: Path) -> dict[str, Any]:
         return data
 
 
-def read_study_plan(file: Path) -> StudyPlan:
+def read_study_plan(file: GivenPath) -> StudyPlan:
     """Read a plan.
 
     Raises
@@ -215,6 +216,7 @@ def read_study_plan(file: Path) -> StudyPlan:
     ScenarioError
         With every problem of it, each with its place and value.
     """
+    file = as_path(file)
     data = read_plan_data(file)
     with in_file(str(file)):
         return validated(StudyPlan, data)

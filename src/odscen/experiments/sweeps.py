@@ -30,6 +30,7 @@ from odscen.base.errors import (
     in_file,
 )
 from odscen.base.folder_locks import locked
+from odscen.base.given_files import as_path
 from odscen.base.stored_files import read_document, tables
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.app.running.runs import CheckedRun
+    from odscen.base.given_files import GivenPath
     from odscen.experiments.table import Limit
     from odscen.experiments.work import Outcome
     from odscen.maps.store import Workspace
@@ -430,7 +432,7 @@ def sweep(
     workspace: Workspace,
     scenario: Scenario,
     plan: SweepPlan,
-    out: Path,
+    out: GivenPath,
     *,
     settings: SweepSettings | None = None,
     processes: int = 1,
@@ -462,7 +464,7 @@ def sweep(
     ConflictError
         If another sweep is in ``out``.
     """
-    settings = settings or SweepSettings()
+    settings, out = settings or SweepSettings(), as_path(out)
     runs = CaseRuns(scenario, out, settings)
     if settings.openscenario is not None:
         Dialect.of(settings.openscenario)  # an unknown version is refused before anything runs

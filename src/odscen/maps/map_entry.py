@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.drawing.map_drawing import MapDrawing
+    from odscen.drawing.map_sheet import Picture
     from odscen.lanegraph.graphs import MapGraph
     from odscen.lanegraph.map_statistics import MapStatistics
     from odscen.lanegraph.query import NearestNode
@@ -192,6 +193,37 @@ class MapEntry:
         from odscen.lanegraph.query import nearest_node
 
         return nearest_node(self.graph(), x, y, hdg)
+
+    def plot(self, *, graph: bool = False, segments: bool = False) -> Picture:
+        """Draw the map, with legend and scale.
+
+        Parameters
+        ----------
+        graph
+            With lane graph and pedestrian graph.
+        segments
+            With the segments, in alternating colours.
+
+        Returns
+        -------
+        Picture
+            Shown by notebooks; ``save`` writes it.
+
+        Raises
+        ------
+        DamagedError
+            If a file of the map is not as it was written.
+        """
+        from odscen.drawing.legend import RenderOptions
+        from odscen.drawing.map_sheet import Picture, render_drawing
+
+        options = RenderOptions(graph=graph, segments=segments)
+        shown = self.graph() if graph or segments else None
+        return Picture(
+            render_drawing(
+                self.drawing(), statistics=self.statistics(), graph=shown, options=options
+            )
+        )
 
     def networkx(self) -> tuple[nx.MultiDiGraph, nx.Graph]:
         """Lane graph and pedestrian graph, see :func:`odscen.lanegraph.networkx_form.to_networkx`.

@@ -7,6 +7,7 @@ before they become paths.
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -68,7 +69,7 @@ def is_outdated(entry: MapEntry) -> bool:
     return importer is not None and importer.version != entry.info["import"]["version"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False)
 class Workspace:
     """A folder with ``maps/``, ``scenarios/`` and ``runs/``, and more as needed.
 
@@ -85,6 +86,9 @@ class Workspace:
     """
 
     root: Path
+
+    def __init__(self, root: GivenPath) -> None:
+        object.__setattr__(self, "root", as_path(root))
 
     @classmethod
     def open(cls, root: GivenPath | None = None) -> Workspace:
@@ -501,6 +505,7 @@ class Workspace:
             )
             write_sums(folder, sums_of(folder, known={source: digest(content)}))
             info = read_entry(folder).info
+        logging.getLogger("odscen").info("map %s: built in %s", name, final)
         return MapEntry(name, final, info)
 
 

@@ -84,7 +84,7 @@ class Event(NamedTuple):
         The rule that has started, ended, failed, or given way to another.
     values
         Rules: what the conditions were about, by their place in ``when``. Collisions found by
-        odscen: ``impact_speed``, m/s.
+        odscen: ``impact_speed``, m/s, and ``overlap``, the share of the width of who hits.
     """
 
     time: float

@@ -11,6 +11,7 @@ import numpy as np
 from odscen.base.markup import Markup, element, join, number, path_data
 from odscen.drawing.map_drawing import Lines
 from odscen.drawing.map_sheet import length_text, round_length
+from odscen.drawing.palette import FONT
 from odscen.drawing.svg_layers import LayerOptions, map_layers
 from odscen.figures.by_place.level_of_service import FEWEST
 from odscen.figures.by_place.traffic import over_run
@@ -213,6 +214,63 @@ def run_map(
     names.append(f"over {limits[-1]} km/h")
     speeds = [(f"v{i}", name) for i, name in enumerate(names)]
     return RunMap(svg, categories, speeds, len(paths.ids), one_in)
+
+
+_SPEED_COLORS = ("#a50026", "#e4572e", "#f5a742", "#f3dc6b", "#74add1", "#3b5fb0")
+"""As in the style sheet of reports, for pictures that stand alone."""
+
+
+def speed_picture(traces: pl.DataFrame, drawing: MapDrawing | None, *, name: str) -> str | None:
+    """Draw the mean speed by place as an SVG document of its own; ``None`` if nobody drove.
+
+    Parameters
+    ----------
+    traces
+        With ``x``, ``y`` (m, OpenDRIVE frame), ``speed`` (m/s) and ``category``.
+    drawing
+        The map to draw below, if there is one.
+    name
+        Of the run.
+    """
+    vehicles = traces.select("x", "y", "speed").filter(traces["category"] != "pedestrian")
+    cells = speed_by_place(vehicles)
+    bounds = fitted_view(cells.corner, drawing)
+    if bounds is None:
+        return None
+    steps = np.searchsorted(SPEED_STEPS_KMH, cells.speed * 3.6, side="right")
+    styles = [f"v{index}" for index in range(len(_SPEED_COLORS))]
+    ground = None
+    if drawing is not None:
+        options = LayerOptions(symbol_size=4.0, prefix="map-")
+        ground = element("g", map_layers(drawing.clipped(bounds), options))
+    wide = (bounds[2] - bounds[0]) * 100
+    limits = [*(number(step, 0) for step in SPEED_STEPS_KMH), "more"]
+    legend = []
+    for index, (color, limit) in enumerate(zip(_SPEED_COLORS, limits, strict=True)):
+        x = round(bounds[0] * 100 + wide * (0.32 + 0.1 * index))
+        y, side = round(-bounds[1] * 100 - wide * 0.033), round(wide * 0.015)
+        legend.append(element("rect", x=x, y=y, width=side, height=side, fill=color))
+        words = f"to {limit} km/h" if limit != "more" else limit
+        at = {"x": x + round(side * 1.3), "y": y + side, "font_size": round(wide * 0.014)}
+        legend.append(element("text", words, **at))
+    rules = "".join(
+        f".{style}{{fill:{color}}}" for style, color in zip(styles, _SPEED_COLORS, strict=True)
+    )
+    svg = element(
+        "svg",
+        element("title", f"Mean speed by place, {name}"),
+        element("style", f"{rules}.scale path{{fill:none;stroke:#22282e}}"),
+        ground,
+        *shaded_cells(cells.corner, cells.size, steps, styles),
+        *legend,
+        scale_bar(bounds),
+        xmlns="http://www.w3.org/2000/svg",
+        viewBox=view_box(bounds),
+        width=900,
+        height=round(900 * (bounds[3] - bounds[1]) / (bounds[2] - bounds[0])),
+        font_family=FONT,
+    )
+    return f"{svg}\n"
 
 
 def fitted_view(everything: FloatArray, drawing: MapDrawing | None) -> Bounds | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal, Self, get_args, get_type_hints
+from html import escape
+from typing import TYPE_CHECKING, Any, Literal, Protocol, Self, get_args, get_type_hints
 
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.given_files import as_path
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.base.given_files import GivenPath
+    from odscen.drawing.map_drawing import MapDrawing
+    from odscen.drawing.map_sheet import Picture
     from odscen.figures.by_place.traffic import TableName
     from odscen.figures.measures.figure import RunFigure
 
@@ -42,6 +45,16 @@ _TABLES: dict[PlaceKind, TableName] = {
     "movement": "movements",
     "lane_group": "lane_groups",
 }
+
+
+_SHOWN = ("planned", "arrived", "collided", "teleported", "mean_delay", "mean_speed")
+"""Figures that a notebook shows."""
+
+
+class _DrawnMap(Protocol):
+    """A map that can be drawn; the map of the catalogue is one, which is above this floor."""
+
+    def drawing(self) -> MapDrawing: ...
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -183,6 +196,74 @@ class Run:
     def __repr__(self) -> str:
         seed, scenario = self.known.get("seed"), self.known.get("scenario")
         return f"<Run of {scenario}, seed {seed}: {self.known['status']}>"
+
+    def _repr_html_(self) -> str:
+        """What notebooks show: the verdict, the figures of note, and a picture."""
+        rows = "".join(
+            f"<tr><th>{escape(row['label'])}</th><td>{row['value']:.4g} {row['unit']}</td></tr>"
+            for row in self.figure_table().iter_rows(named=True)
+            if row["name"] in _SHOWN and row["value"] is not None
+        )
+        words = self.usability.get("headline", "")
+        head = f"<p>{escape(repr(self))} {escape(str(words))}</p><table>{rows}</table>"
+        try:
+            return head + self.plot().svg
+        except InputError:  # without trajectories
+            return head
+
+    def plot(self, map_entry: _DrawnMap | None = None) -> Picture:
+        """Draw the mean speed of vehicles by place.
+
+        Parameters
+        ----------
+        map_entry
+            The map of the run, such as ``workspace.map(NAME)``, to be drawn below.
+
+        Returns
+        -------
+        Picture
+            Shown by notebooks; ``save`` writes it.
+
+        Raises
+        ------
+        InputError
+            If no trajectories of vehicles were recorded.
+        """
+        from odscen.drawing.map_sheet import Picture
+        from odscen.reports.report_maps import speed_picture
+
+        drawing = None if map_entry is None else map_entry.drawing()
+        name = f"{self.known.get('scenario')}, seed {self.known.get('seed')}"
+        svg = speed_picture(self.trajectories(), drawing, name=name)
+        if svg is None:
+            raise InputError("the run has no vehicles to draw", file=str(self.folder))
+        return Picture(svg)
+
+    def figure_table(self) -> pl.DataFrame:
+        """List figures and counts of the run with their units; ``.to_pandas()`` is for pandas.
+
+        Returns
+        -------
+        polars.DataFrame
+            One row per figure: ``name``, ``label``, ``value`` (null where there is nothing to
+            compute it from), ``unit`` (such as s, m/s or kg; empty of counts and shares),
+            ``definition``.
+
+        Raises
+        ------
+        InputError
+            If the records of the run are not whole any more.
+        """
+        import polars as pl
+
+        figures = [entry for name in names_of("run") if (entry := run_figure(name)) is not None]
+        rows = [
+            (entry.name, entry.label, self.value_of(entry), entry.unit, entry.definition)
+            for entry in figures
+        ]
+        schema = {"name": pl.String, "label": pl.String, "value": pl.Float64}
+        schema |= {"unit": pl.String, "definition": pl.String}
+        return pl.DataFrame(rows, schema=schema, orient="row")
 
     @property
     def report(self) -> Path | None:

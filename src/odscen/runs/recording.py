@@ -6,15 +6,17 @@ Trajectories as text, for the command line: ``none``, or ``key=value`` with comm
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Literal, Self, get_args
 
 from odscen.base.durations import parse_duration
 from odscen.base.errors import InputError
 
 NEEDED = ("id", "x", "y", "angle", "speed")
 """Columns that are always recorded: nothing can be drawn or replayed without them."""
-OPTIONAL = ("lane", "pos", "slope")
+RecordedColumn = Literal["lane", "pos", "slope"]
+OPTIONAL: tuple[RecordedColumn, ...] = get_args(RecordedColumn)
 """Columns that can be left out or added; SUMO has them for vehicles and persons alike."""
 REGION_ID = "odscen.recorded"
 """Id of the polygon in SUMO's additional file."""
@@ -44,9 +46,21 @@ class Recording:
     trajectories: bool = True
     every: float | None = None
     region: tuple[float, float, float, float] | None = None
-    columns: tuple[str, ...] = ("lane",)
+    columns: tuple[RecordedColumn, ...] = ("lane",)
     emissions: bool = True
     criticality: bool = False
+
+    def __post_init__(self) -> None:
+        if self.every is not None and not (
+            isinstance(self.every, int | float) and 0 < self.every < math.inf
+        ):
+            raise InputError(f"every must be seconds above 0, not {self.every!r}")
+        if self.region is not None and len(self.region) != 4:
+            raise InputError(f"region must be four numbers, metres, not {self.region!r}")
+        if isinstance(self.columns, str) or not set(self.columns) <= set(OPTIONAL):
+            raise InputError(
+                f"columns must be a tuple of {', '.join(OPTIONAL)}, not {self.columns!r}"
+            )
 
     def with_criticality(self, wanted: bool) -> Self:
         """Record how close road users come too, if that is wanted."""
@@ -70,7 +84,7 @@ def parse_recording(text: str) -> Recording:
         return Recording(trajectories=False)
     every: float | None = None
     region: tuple[float, float, float, float] | None = None
-    columns: tuple[str, ...] = ("lane",)
+    columns: tuple[RecordedColumn, ...] = ("lane",)
     for part in text.split(","):
         key, _, value = (word.strip() for word in part.partition("="))
         if key == "every":
@@ -106,7 +120,7 @@ def _parse_region(text: str) -> tuple[float, float, float, float]:
     return x0, y0, x1, y1
 
 
-def _parse_columns(text: str) -> tuple[str, ...]:
+def _parse_columns(text: str) -> tuple[RecordedColumn, ...]:
     wanted = {word.strip() for word in text.split("+")} - set(NEEDED)
     unknown = sorted(wanted - set(OPTIONAL))
     if unknown:

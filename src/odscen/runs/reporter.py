@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rich.progress import TaskID
+
     from odscen.runs.finished_run import Run
 
 
@@ -13,7 +15,14 @@ if TYPE_CHECKING:
 class Progress:
     """How far a run is: simulated seconds, counts of vehicles and persons.
 
-    ``time_left`` is about how many wall seconds it will take at full speed; ``None`` if unknown.
+    Attributes
+    ----------
+    time, until
+        Simulated seconds, now and at the end.
+    running, departed, arrived, planned
+        Road users.
+    time_left
+        Wall seconds that it will take at full speed, about; ``None`` if unknown.
     """
 
     time: float
@@ -64,6 +73,71 @@ class Reporter:
     def cancelled(self) -> bool:
         """Whether it is to end before its time; what happened until then is kept."""
         return False
+
+
+class ProgressBar(Reporter):
+    """Shows how far runs are, in a terminal or a notebook, on standard error.
+
+    >>> odscen.run(workspace, scenario, reporter=odscen.ProgressBar())
+    """
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import Progress as Bars
+
+        self._bars = Bars(console=Console(stderr=True))
+        self._left: set[TaskID] = set()
+
+    def of_run(self, name: str) -> Reporter:
+        """Return the reporter of one run, which has a bar of its own."""
+        return _RunBar(self, name)
+
+    def advanced(self, progress: Progress) -> None:
+        """Show it in the bar of the only run."""
+        if not self._left:
+            self._own = _RunBar(self, "run")
+        self._own.advanced(progress)
+
+    def finished(self, run: Run) -> None:
+        """Fill the bar of the only run."""
+        if self._left:
+            self._own.finished(run)
+
+    def begin(self, name: str) -> TaskID:
+        """Show a bar; the display begins with the first."""
+        if not self._left:
+            self._bars.start()
+        task = self._bars.add_task(name, total=1.0)
+        self._left.add(task)
+        return task
+
+    def show(self, task: TaskID, share: float) -> None:
+        """Set a bar; the display ends with the last that is full."""
+        self._bars.update(task, completed=share)
+        if share >= 1.0:
+            self._left.discard(task)
+            if not self._left:
+                self._bars.stop()
+
+
+class _RunBar(Reporter):
+    """The bar of one run."""
+
+    def __init__(self, bars: ProgressBar, name: str) -> None:
+        self._bars, self._name = bars, name
+        self._task: TaskID | None = None
+
+    def advanced(self, progress: Progress) -> None:
+        self._show(min(progress.share, 0.999))
+
+    def finished(self, run: Run) -> None:
+        del run
+        self._show(1.0)
+
+    def _show(self, share: float) -> None:
+        if self._task is None:
+            self._task = self._bars.begin(self._name)
+        self._bars.show(self._task, share)
 
 
 SILENT = Reporter()

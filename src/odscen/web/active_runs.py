@@ -257,6 +257,7 @@ class Runs:
             finished=self.kept.end_time(run) if over else None,
             slices=self.kept.slices(run),
             preparing=active.preparing if active.state == "preparing" else None,
+            clock=active.scenario.demand.clock,
         )
 
     def rows(self, *, scenario: str | None = None) -> list[RunInfo]:

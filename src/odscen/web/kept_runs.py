@@ -180,7 +180,9 @@ class KeptRuns:
             said = json.loads(read_checked(folder, layout.SCENARIO_FILE, read_sums(folder)))
             said.pop("name", None)
             said.pop("description", None)
-            counts = sum(len(part["rows"]) for part in said.get("demand", {}).get("counts", ()))
+            demand = said.get("demand", {})
+            counts = sum(len(part["rows"]) for part in demand.get("counts", ()))
+            clock_time = float(demand.get("clock", 0.0))
         except DamagedError as error:
             if (folder / layout.SCENARIO_FILE).is_file():
                 raise
@@ -188,7 +190,7 @@ class KeptRuns:
         except (ValueError, RecursionError, AttributeError, KeyError, TypeError) as error:
             raise NotFoundError("scenario of run", run, []) from error
         digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
-        return RunContent(digest=digest, counts=counts)
+        return RunContent(digest=digest, counts=counts, clock=clock_time)
 
     def files(self, run: str) -> list[RunFile]:
         """Files of a run that can be downloaded, by name."""

@@ -10,7 +10,7 @@ from odscen.app.running.runs import run
 from odscen.app.scenarios import read_scenario
 from odscen.base.checksums import SUMS_FILE
 from odscen.base.errors import DamagedError, InputError
-from odscen.experiments.compare import read_runs
+from odscen.experiments.comparisons import read_runs
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
 

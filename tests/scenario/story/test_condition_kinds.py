@@ -92,6 +92,21 @@ def test_who_stands_has_no_headway_that_could_be_above_a_bound() -> None:
     assert 0.0 < found <= 0.1
 
 
+def test_with_ahead_there_is_no_headway_to_one_behind_and_without_free_it_is_of_centres() -> None:
+    """The car at 10 m/s is overtaken at 20 m/s by one 24 m behind; bodies are 4 m long."""
+    passes = replace(EGO, x=-24.0, speed=20.0, length=4.0)
+    above = {"headway": {"of": "car", "to": "ego", "above": 1.0, "ahead": True, "free": False}}
+    [found] = started(story([rule(above)], CAR, passes, until=6.0))
+    assert found == pytest.approx((24.0 + 10.0) / 10.0, abs=1e-6)
+    free = {"headway": {**above["headway"], "free": True}}
+    [found] = started(story([rule(free)], CAR, passes, until=6.0))
+    assert found == pytest.approx((24.0 + 4.0 + 10.0) / 10.0, abs=1e-6)
+    [found] = started(
+        story([rule({"headway": {"of": "car", "to": "ego", "above": 1.0}})], CAR, passes)
+    )
+    assert found == 0.0
+
+
 def test_bodies_that_touch_and_stay_so_have_no_time_to_collision() -> None:
     beside = replace(CAR, id="ego", x=-4.0)
     assert started(story([rule({"ttc": {"to": "ego", "below": 3.0}})], CAR, beside)) == []

@@ -11,7 +11,7 @@ import type { LoopPlace } from "../../signals/laneLines";
 import type { Region } from "../asked";
 import type { Changes } from "../changes";
 import type { PlacePick } from "../pick";
-import type { Starts } from "../placing";
+import type { BodySize, Starts } from "../placing";
 import type { Step } from "../scene";
 
 /** Stations of a route, at least two, one of which is being chosen: the route is shown before the click. */
@@ -85,6 +85,8 @@ export interface Editing {
   actors: readonly SceneActor[];
   flows: readonly SceneFlow[];
   starts: Starts;
+  /** Length and width that are usual for a kind of road user, metres. */
+  sizeOf: (category: Category) => BodySize;
   selection: readonly string[];
   /** The only one that is selected, and where it can go; null until that is known. */
   one: Actor | Flow | null;

@@ -1,7 +1,7 @@
 import type { Step } from "../scene";
 import { withDetectors } from "./detectors";
 import { type Editing, type Handler, LOOKING, type Tool } from "./handler";
-import { withLights } from "./lights";
+import { lightsHandler, withLights } from "./lights";
 import { pickingHandler } from "./picking";
 import { regionHandler } from "./region";
 import { selectHandler } from "./select";
@@ -14,6 +14,7 @@ const OF_STEP: Partial<Record<Step, (editing: Editing) => Handler>> = {
   region: regionHandler,
   traffic: trafficHandler,
   transit: lookingHandler,
+  lights: lightsHandler,
   measures: lookingHandler,
   rules: lookingHandler,
   study: lookingHandler,

@@ -1,6 +1,7 @@
 import { t } from "@lingui/core/macro";
 
-import { type Editing, type Handler } from "./handler";
+import type { Pointed } from "../../map/MapCanvas";
+import { type Editing, type Handler, type Hover, LOOKING } from "./handler";
 import { goalAt, oneAt } from "./select";
 
 /** Besides what a handler does: a click on a traffic light shows its program. */
@@ -10,12 +11,9 @@ export function withLights(handler: Handler, editing: Editing): Handler {
     ...handler,
     under: (at) => {
       const junction = lights?.junctionAt(at) ?? null;
-      return junction === null ? handler.under(at) : { is: "light", junction };
+      return lightHover(junction) ?? handler.under(at);
     },
-    hint: (hover) =>
-      hover?.is === "light"
-        ? t`Traffic light of junction ${hover.junction}: click to see its program`
-        : handler.hint(hover),
+    hint: (hover) => (hover?.is === "light" ? lightWords(hover) : handler.hint(hover)),
     pick: (at) => {
       // Road users and goals that lie on a stop line come first.
       const junction = oneAt(editing, at) || goalAt(editing, at) ? null : lights?.junctionAt(at);
@@ -24,3 +22,33 @@ export function withLights(handler: Handler, editing: Editing): Handler {
     },
   };
 }
+
+/** A click this near to a signal means its junction where nothing else is meant, metres. */
+const REACH = 40;
+
+/** Where only lights are chosen: a click anywhere on a junction shows its program. */
+export const lightsHandler = ({ lights, showLight }: Editing): Handler => {
+  const there = (at: Pointed): string | null =>
+    lights?.junctionAt({ ...at, reach: Math.max(at.reach, REACH) }) ?? null;
+  return {
+    ...LOOKING,
+    aim: true,
+    under: (at) => lightHover(there(at)),
+    hint: (hover) =>
+      hover?.is === "light"
+        ? lightWords(hover)
+        : lights && lights.junctions.length > 0
+          ? t`Click a junction with a traffic light to see its program`
+          : null,
+    pick: (at) => {
+      const junction = there(at);
+      if (junction !== null) showLight(junction);
+    },
+  };
+};
+
+export const lightHover = (junction: string | null): Hover | null =>
+  junction === null ? null : { is: "light", junction };
+
+export const lightWords = ({ junction }: Extract<Hover, { is: "light" }>): string =>
+  t`Traffic light of junction ${junction}: click to see its program`;

@@ -19,6 +19,7 @@ export function placeTool(category: Category): Tool {
         badge: category,
         who,
         prompt: startPrompt(who, walks),
+        size: walks ? null : editing.sizeOf(category),
         apply: (to) => editing.changes.place(category, to),
       }),
   };

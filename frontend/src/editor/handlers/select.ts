@@ -9,7 +9,7 @@ import { chosenGoalAt, goalCarrier } from "./goal";
 import { type Editing, type Handler, LOOKING, onFoot } from "./handler";
 import { routeHover, waypointGrab } from "./waypoint";
 
-/** Without a tool: a click selects or sets the goal; a drag takes road users, a goal or a route along. */
+/** Without a tool: a click selects or sets the goal; a drag takes along what is selected, its goal or route. */
 export const selectHandler = (editing: Editing): Handler => ({
   ...LOOKING,
   walks: editing.one ? onFoot(editing, editing.one.id) : null,
@@ -25,9 +25,10 @@ export const selectHandler = (editing: Editing): Handler => ({
   },
   grab: (at) => {
     const id = oneAt(editing, at);
-    if (id !== null) return carrier(editing, id);
+    // A drag that begins on any other one moves the map, as everywhere else.
+    if (id !== null && editing.selection.includes(id)) return carrier(editing, id);
     if (editing.one && chosenGoalAt(editing, at)) return goalCarrier(editing, editing.one);
-    return goalAt(editing, at) ? null : waypointGrab(editing, at);
+    return id !== null || goalAt(editing, at) ? null : waypointGrab(editing, at);
   },
   frame: (area) => selectFrame(editing, area),
 });

@@ -3,6 +3,8 @@ import { t } from "@lingui/core/macro";
 import { localized } from "../../language/localized";
 import type { Category } from "../../api/types";
 import type { Place } from "../../map/graph";
+import { lengthText } from "../../language/units";
+import type { BodySize } from "../placing";
 import { laneWord } from "../placeWords";
 import { type Editing, type Hover, LOOKING, placeHover, type ToolHandler } from "./handler";
 import { choose, oneAt, selectFrame } from "./select";
@@ -15,13 +17,18 @@ interface Starting {
   who: string;
   /** Said while nothing is under the pointer. */
   prompt: string;
+  /** The body for which there is to be room. */
+  size?: BodySize | null;
   apply: (to: Place) => void;
 }
+
+/** From so many metres on it is said that another point was taken than the one that was meant. */
+const FAR = 3;
 
 /** A click on a free start uses it, whatever goals lie there; a click on a road user selects. */
 export function startingHandler(
   editing: Editing,
-  { walks, badge, who, prompt, apply }: Starting,
+  { walks, badge, who, prompt, size, apply }: Starting,
 ): ToolHandler {
   const { graph, starts, ones, roi, say, openStep } = editing;
   return {
@@ -29,15 +36,19 @@ export function startingHandler(
     aim: true,
     walks,
     badge,
-    under: ({ x, y, reach }) => placeHover(starts.near(x, y, reach, walks)),
+    under: ({ x, y, reach }) => placeHover(starts.near(x, y, reach, walks, { size })),
     hint: (hover) => (hover?.is === "place" ? whereabouts(editing, hover) : prompt),
     pick: (at) => {
       const there = oneAt(editing, at);
       if (there !== null) choose(editing, there, at.shift);
       else {
-        const to = starts.near(at.x, at.y, at.reach, walks);
-        if (to) apply(to);
-        else if (roi.length === 0) openStep("region");
+        const to = starts.near(at.x, at.y, at.reach, walks, { size });
+        if (to) {
+          apply(to);
+          const away = starts.beyond(at.x, at.y, at.reach, to);
+          if (away > FAR)
+            say(t`There is no room there: the next free point, ${lengthText(away)} away, was taken.`);
+        } else if (roi.length === 0) openStep("region");
         else say(starts.reasonAt(at.x, at.y, at.reach, walks, who));
       }
     },

@@ -3,6 +3,7 @@ import { Select, Switch, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { short } from "../../language/numbers";
 import { Committed } from "../Committed";
+import { MomentField } from "../MomentField";
 import { CommittedText, PickButton } from "../FormParts";
 import type { PlacePick } from "../pick";
 import { fieldStart, namesOf, placeText, readPlace } from "./draft";
@@ -132,7 +133,19 @@ function NumberField({
   value: unknown;
   onChange: (value: number | null) => void;
 }) {
-  const { label, suffix, min, max, digits, scale, start } = field;
+  const { label, suffix, min, max, digits, scale, start, moment } = field;
+  if (moment)
+    return (
+      <MomentField
+        label={label}
+        unit="s"
+        step={1}
+        value={typeof value === "number" ? value : null}
+        onCommit={(next) => {
+          if (next !== null) onChange(next);
+        }}
+      />
+    );
   return (
     <Committed
       label={label}

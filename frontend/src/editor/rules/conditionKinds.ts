@@ -1,6 +1,7 @@
 import { t } from "@lingui/core/macro";
 
 import { localized } from "../../language/localized";
+import { clock, hasClock } from "../../language/moments";
 import type { ScenarioDocument } from "../../api/types";
 import {
   amount,
@@ -47,8 +48,11 @@ export const CONDITION_KINDS = localized((): Record<ConditionKind, Kind> => ({
   },
   time: {
     label: t`Time`,
-    fields: [number("after", t`After`, " s", 10, { max: 1e6 })],
-    words: (v) => t`time is ${amount(v.after, "s")} or more`,
+    fields: [number("after", t`After`, " s", 10, { max: 1e6, moment: true })],
+    words: (v) =>
+      hasClock() && typeof v.after === "number"
+        ? t`it is ${clock(v.after)} or later`
+        : t`time is ${amount(v.after, "s")} or more`,
   },
   headway: {
     label: t`Time headway`,

@@ -24,6 +24,8 @@ export type PlainField =
       scale: number;
       /** What a new one begins with; without it the field may be empty. */
       start?: number;
+      /** Whether it is a moment of the run. */
+      moment?: boolean;
     })
   | (Named & { is: "actor"; optional?: boolean })
   /** A place, light or movement, picked on the map or typed. */
@@ -66,7 +68,7 @@ export const number = (
   label: string,
   suffix: string,
   start?: number,
-  more: Partial<Pick<NumberField, "min" | "max" | "digits" | "scale">> = {},
+  more: Partial<Pick<NumberField, "min" | "max" | "digits" | "scale" | "moment">> = {},
 ): NumberField => ({
   is: "number",
   name,

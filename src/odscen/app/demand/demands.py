@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from contextlib import contextmanager
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import polars as pl
 
 from odscen.app.maps import load_map, map_of
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, ScenarioError, in_file
-from odscen.base.given_files import read_given_text
+from odscen.base.given_files import as_path, read_given_text
 from odscen.base.stored_files import tables
 from odscen.runs.deferred_figures import checked_summary
 from odscen.runs.layout import REPORT_FILE, SCENARIO_FILE
@@ -37,15 +37,18 @@ from odscen.sumo.calibrate.town_day import TOWN_MIX, town_day
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.lanegraph.graphs import MapGraph
     from odscen.maps.store import Workspace
     from odscen.scenario.demand.inflow import Entry
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.count_fit import CountFits
     from odscen.sumo.calibrate.town_day import Load
+
+TableKind = Literal["od", "inputs", "counts", "profile", "zones"]
+"""What a table of demand has."""
 
 MOST_TRIPS = 1e7
 """Of a day, as of a matrix of the document."""
@@ -54,9 +57,9 @@ MOST_TRIPS = 1e7
 def import_demand(
     workspace: Workspace,
     scenario: Scenario,
-    file: Path,
+    file: GivenPath,
     *,
-    kind: str,
+    kind: TableKind,
     name: str | None = None,
     day: str | None = None,
     **fields: Any,
@@ -93,7 +96,9 @@ def import_demand(
     ScenarioError
         If the scenario has no such places.
     """
-    loaded = map_of(workspace, scenario)
+    if kind not in get_args(TableKind):
+        raise InputError(f"kind must be one of {', '.join(get_args(TableKind))}, not {kind!r}")
+    loaded, file = map_of(workspace, scenario), as_path(file)
     text = read_given_text(file)
     with in_file(str(file)):
         return import_text(loaded, scenario, text, kind=kind, name=name, day=day, **fields)
@@ -314,7 +319,7 @@ def with_whole_day(
     return scenario, load
 
 
-def fit_counts(workspace: Workspace, path: Path) -> CountFits:
+def fit_counts(workspace: Workspace, path: GivenPath) -> CountFits:
     """Hold traffic against the counts of its scenario: as planned, or as a run had it.
 
     Parameters
@@ -336,6 +341,7 @@ def fit_counts(workspace: Workspace, path: Path) -> CountFits:
     DamagedError
         If a file of the run is not as it was written.
     """
+    path = as_path(path)
     folder = path if path.is_dir() else None
     if folder is not None:
         checked_summary(folder, leave=(REPORT_FILE,))

@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 
 from odscen.app.maps import map_of
 from odscen.base.errors import InputError, in_file
-from odscen.base.given_files import MOST, UNREADABLE_ARCHIVE, read_given, read_given_text
+from odscen.base.given_files import (
+    MOST,
+    UNREADABLE_ARCHIVE,
+    as_path,
+    read_given,
+    read_given_text,
+)
 from odscen.formats.gtfs_feed import CALENDARS, NEEDED, read_feed
 from odscen.formats.gtfs_lines import place_feed
 from odscen.opendrive.parse import parse
@@ -22,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.arrays import FloatArray
+    from odscen.base.given_files import GivenPath
     from odscen.formats.gtfs_lines import PlacedFeed
     from odscen.maps.store import Workspace
     from odscen.opendrive.road_model import Header
@@ -34,7 +41,7 @@ WITHIN = 30.0
 def import_transit(
     workspace: Workspace,
     scenario: Scenario,
-    file: Path,
+    file: GivenPath,
     *,
     day: date | None = None,
     routes: Sequence[str] = (),
@@ -67,6 +74,7 @@ def import_transit(
     InputError
         If the map has no georeference, or the feed cannot be read.
     """
+    file = as_path(file)
     entry = workspace.map_for(scenario.map.name, scenario.map.sha256)
     header = parse(entry.read("xodr"), file=entry.path("xodr").name).header
     project = projection(header)

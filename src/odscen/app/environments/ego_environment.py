@@ -25,9 +25,8 @@ except ImportError as error:
     raise MissingDependencyError("environments need gymnasium: pip install 'odscen[rl]'") from error
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from odscen.app.environments.driving_tasks import Reward
+    from odscen.base.given_files import GivenPath
     from odscen.learning.behaviour.behaviour_model import RoadObservation
     from odscen.learning.fill import Array
     from odscen.maps.store import Workspace
@@ -64,7 +63,7 @@ class EgoEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there without 
     def __init__(
         self,
         workspace: Workspace,
-        scenario: Scenario | Path,
+        scenario: Scenario | GivenPath,
         *,
         settings: RunSettings = LEAN,
         reward: Reward = progress_reward,

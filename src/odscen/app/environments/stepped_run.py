@@ -28,9 +28,8 @@ from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from odscen.base.arrays import BoolArray
+    from odscen.base.given_files import GivenPath
     from odscen.learning.behaviour.behaviour_model import (
         BehaviourScene,
         DrivingAction,
@@ -74,7 +73,7 @@ class SteppedRun:
     """
 
     def __init__(
-        self, workspace: Workspace, scenario: Scenario | Path, *, settings: RunSettings = LEAN
+        self, workspace: Workspace, scenario: Scenario | GivenPath, *, settings: RunSettings = LEAN
     ) -> None:
         self._scratch = ExitStack()
         folder = self._scratch.enter_context(scratch_folder())

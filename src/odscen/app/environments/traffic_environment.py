@@ -29,9 +29,9 @@ except ImportError as error:
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
     from odscen.app.environments.driving_tasks import Reward
+    from odscen.base.given_files import GivenPath
     from odscen.learning.behaviour.behaviour_model import RoadObservation
     from odscen.learning.fill import Array
     from odscen.maps.store import Workspace
@@ -62,7 +62,7 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
     def __init__(
         self,
         workspace: Workspace,
-        scenario: Scenario | Path,
+        scenario: Scenario | GivenPath,
         *,
         settings: RunSettings = LEAN,
         reward: Reward = progress_reward,

@@ -215,7 +215,7 @@ class ExportedFiles(NamedTuple):
 
 def export_to_memory(
     workspace: Workspace,
-    source: Scenario | Path,
+    source: Scenario | GivenPath,
     *,
     to: str,
     name: str | None = None,

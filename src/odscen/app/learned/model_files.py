@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from odscen.app.learned.learned_maps import examples_of
 from odscen.app.learned.snapshot_data import read_shards
 from odscen.base.errors import InputError
-from odscen.base.given_files import read_given
+from odscen.base.given_files import as_path, read_given
 from odscen.base.text_files import write_file
 from odscen.learning.reference.model_training import TrainingSettings, train_model
 from odscen.learning.reference.traffic_model import model_bytes, model_from_bytes
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.learning.reference.traffic_model import TrafficModel
     from odscen.learning.traffic_snapshots import Shard
     from odscen.maps.store import Workspace
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
 def train(
     workspace: Workspace,
-    data: Path,
-    out: Path,
+    data: GivenPath,
+    out: GivenPath,
     *,
     hold_out: Sequence[str] = (),
     settings: TrainingSettings | None = None,
@@ -48,9 +49,9 @@ def train(
     NotFoundError
         If the workspace lacks one of the maps.
     """
-    shards = read_shards(data)
+    shards = read_shards(as_path(data))
     model = train_on(workspace, kept(shards, hold_out), settings=settings, told=told)
-    write_file(out, model_bytes(model))
+    write_file(as_path(out), model_bytes(model))
     return model
 
 

@@ -19,6 +19,7 @@ from odscen.app.running.runs import check_run
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
+from odscen.base.given_files import as_path
 from odscen.base.text_files import write_file, write_text
 from odscen.base.version import __version__
 from odscen.learning.reference.gap_states import seen_ahead
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.lanegraph.graphs import MapGraph
     from odscen.learning.traffic_snapshots import LightView
     from odscen.maps.store import Workspace
@@ -168,7 +170,7 @@ class MadeShard(NamedTuple):
 def make_shards(
     workspace: Workspace,
     maps: Sequence[str],
-    out: Path,
+    out: GivenPath,
     *,
     settings: DataSettings,
     done: Callable[[MadeShard], None] | None = None,
@@ -188,6 +190,7 @@ def make_shards(
             f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
         )
     entries = [workspace.map(name) for name in names]
+    out = as_path(out)
     out.mkdir(parents=True, exist_ok=True)
     made = []
     for entry in entries:

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
     from odscen.runs.reporter import Reporter
@@ -198,7 +199,7 @@ def parse_share(text: str) -> float:
 
 def run_until_confident(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
     share: float,
     figure: str = FIGURE,

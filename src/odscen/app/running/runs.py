@@ -8,6 +8,7 @@ of it, and :mod:`~odscen.app.running.batches` for several. What a run is to be l
 
 from __future__ import annotations
 
+import logging
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -77,6 +78,8 @@ class CheckedRun:
         What plays it.
     unsupported
         What the simulator does not do of it; no error is among them.
+    warnings
+        What the checks of the scenario warn of.
     """
 
     name: str
@@ -87,6 +90,7 @@ class CheckedRun:
     settings: RunSettings
     simulator: AnySimulator
     unsupported: tuple[Problem, ...] = ()
+    warnings: tuple[Problem, ...] = ()
 
     @property
     def map(self) -> LoadedMap:
@@ -141,11 +145,13 @@ def check_run(
     loaded, assets = load_map(entry), workspace.assets()
     parking = loaded.sumo.parking
     found = check(scenario, loaded.sumo.graph, assets, loaded.lights, parking=parking)
-    refuse_errors((*found, *criteria_problems(scenario)))
+    warnings = refuse_errors((*found, *criteria_problems(scenario)))
     unsupported = unsupported_parts(simulator, scenario, run_map(entry, assets))
     refuse_errors(unsupported)
     folder = (workspace.runs if out is None else as_path(out)) / name
-    return CheckedRun(name, scenario, entry, assets, folder, settings, simulator, unsupported)
+    return CheckedRun(
+        name, scenario, entry, assets, folder, settings, simulator, unsupported, warnings
+    )
 
 
 def run_map(entry: MapEntry, assets: Assets) -> RunMap:
@@ -303,6 +309,9 @@ def carry_out(
                 figures=figures,
             )
     reporter.finished(result)
+    words = "run %s: %s, %g s simulated in %.1f s, in %s"
+    spent = result.known["sim_seconds"] or 0.0, result.known["wall_seconds"]
+    logging.getLogger("odscen").info(words, run.name, result.status, *spent, result.folder)
     return result
 
 

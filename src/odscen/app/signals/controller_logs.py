@@ -27,7 +27,6 @@ from odscen.scenario.signals.light import find_movements, known_names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     import polars as pl
 
@@ -56,7 +55,7 @@ class _Change(NamedTuple):
 
 def play_controller_log(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     file: GivenPath,
     *,
     junction: str,

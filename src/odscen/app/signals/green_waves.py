@@ -35,9 +35,9 @@ from odscen.sumo.realize.lights.light_realization import realized_lights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.signals.green_wave import Favoured
@@ -169,7 +169,7 @@ class Coordination:
 
 def coordinate_signals(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
     junctions: Sequence[str] = (),
     along: Sequence[str] = (),

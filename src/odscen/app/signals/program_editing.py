@@ -21,8 +21,7 @@ from odscen.sumo.calibrate.light_timing import retimed, stretched, timing_of, wi
 from odscen.sumo.realize.lights.light_realization import realized_lights
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.records.light_programs import LightProgram
     from odscen.scenario.document.scenario_document import Scenario
@@ -32,7 +31,7 @@ _DAY = 86_400.0
 
 def stretch_cycle(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     junction: str,
     *,
     cycle: float,
@@ -73,7 +72,9 @@ def stretch_cycle(
     return new
 
 
-def take_over_program(workspace: Workspace, scenario: Scenario | Path, junction: str) -> Scenario:
+def take_over_program(
+    workspace: Workspace, scenario: Scenario | GivenPath, junction: str
+) -> Scenario:
     """Make the map's program of a light one of the scenario, which can be changed as a whole.
 
     Signal groups, stages and greens are those of the map, with the times that the scenario gives

@@ -23,8 +23,8 @@ from odscen.runs.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.figures.measures.comparison import Difference
     from odscen.maps.store import Workspace
     from odscen.runs.finished_run import Run
@@ -105,9 +105,9 @@ class SignalEvaluation:
 
 def evaluate_signals(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
-    today: Scenario | Path | None = None,
+    today: Scenario | GivenPath | None = None,
     seeds: Sequence[int] = SEEDS,
     processes: int = 1,
     reporter: Reporter = SILENT,

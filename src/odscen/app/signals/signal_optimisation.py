@@ -36,9 +36,9 @@ from odscen.sumo.realize.lights.light_realization import realized_lights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.calibrate.turning_volumes import PlannedVehicle, Volumes
@@ -108,7 +108,7 @@ class TimedSignals:
 
 def time_signals(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
     junctions: Sequence[str] = (),
     begin: float | None = None,

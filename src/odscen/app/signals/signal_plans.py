@@ -11,7 +11,7 @@ from lxml import etree
 from odscen.app.maps import map_of
 from odscen.app.scenarios import given_scenario
 from odscen.base.errors import InputError, NotFoundError, in_file
-from odscen.base.given_files import read_given
+from odscen.base.given_files import as_path, read_given
 from odscen.base.xml_reading import read_xml
 from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import refuse_errors
@@ -20,8 +20,8 @@ from odscen.scenario.edits.edit_registry import changed_part, with_fields
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
-    from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.formats.tll_file import SignalFile
     from odscen.formats.tll_program import TakenPlan
     from odscen.maps.store import Workspace
@@ -32,7 +32,7 @@ _DAY = 86_400.0
 
 
 def signal_programs(
-    workspace: Workspace, scenario: Scenario | Path, *, whole_day: bool = False
+    workspace: Workspace, scenario: Scenario | GivenPath, *, whole_day: bool = False
 ) -> tuple[LightProgram, ...]:
     """Tell what each traffic light shows in a scenario.
 
@@ -66,7 +66,7 @@ def signal_programs(
     return tuple(light.shown for light in realized_lights(scenario, loaded.sumo, until=until))
 
 
-def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:
+def export_signals(workspace: Workspace, scenario: Scenario | GivenPath) -> str:
     """Write the programs that a scenario gives to lights, as SUMO's additional file.
 
     Parameters
@@ -110,8 +110,8 @@ def export_signals(workspace: Workspace, scenario: Scenario | Path) -> str:
 
 def import_signals(
     workspace: Workspace,
-    scenario: Scenario | Path,
-    file: Path,
+    scenario: Scenario | GivenPath,
+    file: GivenPath,
     *,
     junctions: Sequence[str] = (),
     strict: bool = False,
@@ -152,7 +152,7 @@ def import_signals(
     return take_signals(
         workspace,
         given_scenario(scenario),
-        read_given(file),
+        read_given(as_path(file)),
         file=str(file),
         junctions=junctions,
         strict=strict,

@@ -14,9 +14,9 @@ from odscen.sumo.realize.lights.actuated.detector_places import lane_lines
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
-    from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.maps.store import Workspace
     from odscen.records.light_programs import LightProgram
@@ -71,7 +71,7 @@ def chosen_lights(
 
 
 def signal_sheets(
-    workspace: Workspace, scenario: Scenario | Path, *, junctions: Sequence[str] = ()
+    workspace: Workspace, scenario: Scenario | GivenPath, *, junctions: Sequence[str] = ()
 ) -> dict[str, str]:
     """Draw what lights of a scenario are told to show, with all plans of the day.
 

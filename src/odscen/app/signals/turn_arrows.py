@@ -39,8 +39,8 @@ from odscen.sumo.calibrate.turning_volumes import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
     from collections.abc import Set as AbstractSet
-    from pathlib import Path
 
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.document.signals_document import JunctionTiming
@@ -96,7 +96,7 @@ def arrow_words(arrows: Sequence[TurnArrow]) -> tuple[str, ...]:
 
 def with_turn_arrows(
     workspace: Workspace,
-    scenario: Scenario | Path,
+    scenario: Scenario | GivenPath,
     *,
     junctions: Sequence[str] = (),
     begin: float | None = None,

@@ -33,6 +33,12 @@ MOST_PLACES = 2_000_000
 _LEAST = 1e-3
 """Metres between vertices."""
 
+_STEP_BACK = 0.05
+"""Metres; converters round places by less."""
+
+_NEAR = 2.0
+"""Metres between the end of a stretch and the start of the next, if they are meant to meet."""
+
 
 class Stretch(NamedTuple):
     """Part of an OpenDRIVE lane (a row of the road table) in the direction that it is gone along.
@@ -139,6 +145,9 @@ def evaluate(alignments: Sequence[LaneAlignment], table: RoadTable) -> list[Line
     rows = np.array([stretch.row for stretch in flat], dtype=np.int64)
     start = np.array([stretch.start for stretch in flat])
     end = np.array([stretch.end for stretch in flat])
+    of_alignment = np.concatenate(([0], np.cumsum([len(alignment) for alignment in alignments])))
+    inner = np.setdiff1d(np.arange(len(flat) - 1), of_alignment[1:] - 1)
+    end = _without_steps_back(flat, inner, end, table)
     step = max(DENSE, float(np.abs(end - start).sum()) / MOST_PLACES)
     first, owner, share = spread(np.abs(end - start), step)
     s = start[owner] + share * (end - start)[owner]
@@ -146,7 +155,6 @@ def evaluate(alignments: Sequence[LaneAlignment], table: RoadTable) -> list[Line
     out = np.array([x.beside for x in flat])[owner] * np.sign(table.lane_id[rows[owner]])
     x, y = found.x - out * np.sin(found.hdg), found.y + out * np.cos(found.hdg)
     points = np.column_stack((x, y, found.z))
-    of_alignment = np.concatenate(([0], np.cumsum([len(alignment) for alignment in alignments])))
     bounds = first[of_alignment]
     shapes = thinned([_drop_repeated_vertices(points[a:b]) for a, b in pairwise(bounds)])
     lines: list[Line] = []
@@ -168,6 +176,40 @@ def evaluate(alignments: Sequence[LaneAlignment], table: RoadTable) -> list[Line
             )
         )
     return lines
+
+
+def _without_steps_back(
+    flat: Sequence[Stretch], inner: IndexArray, end: FloatArray, table: RoadTable
+) -> FloatArray:
+    """Ends of stretches, those earlier behind whose end the next stretch begins.
+
+    A connecting road that does not begin in the direction in which the road before it ends has its
+    lanes a little behind the ends of that road's: vehicles would go back and turn round twice.
+
+    Parameters
+    ----------
+    inner
+        Rows of the stretches that another one follows.
+    """
+    ending = [flat[row] for row in inner]
+    following = [flat[row + 1] for row in inner]
+    if not ending:
+        return end
+    places = table.lane_points(
+        np.array([stretch.row for stretch in (*ending, *following)], dtype=np.int64),
+        np.array([*(stretch.end for stretch in ending), *(after.start for after in following)]),
+        at=np.array([stretch.at for stretch in (*ending, *following)]),
+    )
+    count = len(ending)
+    sense = np.array([np.sign(stretch.end - stretch.start) for stretch in ending])
+    away = np.stack([places.x[count:] - places.x[:count], places.y[count:] - places.y[:count]])
+    heading = places.hdg[:count]
+    along = sense * (away[0] * np.cos(heading) + away[1] * np.sin(heading))
+    extent = np.array([stretch.extent for stretch in ending])
+    back = (-along > _STEP_BACK) & (np.hypot(*away) < _NEAR) & (-along < extent - DENSE)
+    shortened = end.copy()
+    shortened[inner[back]] += sense[back] * along[back]
+    return shortened
 
 
 def spread(extents: FloatArray, step: float) -> tuple[IndexArray, IndexArray, FloatArray]:

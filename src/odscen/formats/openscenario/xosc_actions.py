@@ -186,8 +186,6 @@ def _write_offset(made: Actions, part: Any, actor: str, where: str) -> list[_Ele
 def _keep_gap(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
     if part.seconds is not None and made.dialect.for_scenario_runner:
         raise CannotSayError("a gap in seconds, which ScenarioRunner refuses")
-    if part.lasting is not None:
-        made.notes.approximated.append((where, "the gap is kept without end"))
     about: dict[str, object] = {}
     if made.dialect.minor >= 1:
         side = "leading" if part.ahead else "trailing"

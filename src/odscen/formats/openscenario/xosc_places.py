@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.base.categories import Category
 from odscen.formats.openscenario.dialect import xml
 from odscen.lanegraph.query import is_walk_node_id, node_index, walk_node_index
+from odscen.scenario.placing.bodies import body_of
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
@@ -109,12 +110,12 @@ class Places:
             centre = GroundPose(here.x, here.y, here.z, float(walks.hdg[node]))
         else:
             centre = self.spot(actor.spawn)
-        return centre.left(actor.lateral_offset).back(self.centre_ahead(actor))
+        back = self.centre_ahead(actor) - actor.longitudinal_offset
+        return centre.left(actor.lateral_offset).back(back)
 
     def body(self, actor: Actor) -> Body:
         """Size of an actor."""
-        known = None if actor.model is None else self.source.assets.dimensions(actor.model)
-        return known or DEFAULT_BODY[actor.category]
+        return body_of(actor, self.source.assets)
 
     def centre_ahead(self, actor: Actor) -> float:
         """Metres from the reference point, the rear axle, ahead to the centre of the body."""

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from odscen.formats.base import ExportNotes
     from odscen.formats.openscenario.dialect import Dialect
     from odscen.formats.openscenario.xosc_places import Places
-    from odscen.scenario.document.rules_document import StoryRule
+    from odscen.scenario.document.rules_document import Action, StoryRule
     from odscen.scenario.document.scenario_document import Actor, Scenario
 
 _LONGEST: Final = 300.0
@@ -180,6 +180,7 @@ class Story:
         triggers = Triggers(self.places, self.dialect, self.notes, events)
         makes = Actions(self.places, self.dialect, self.notes, actors, self.scenario.rules)
         made: list[_Element] = []
+        lasting: float | None = None
         said = _items_written(rule)
         for index in {*range(len(rule.then))} - {*said}:
             self.notes.approximated.append((f"{where}.then", f"item {index}: {IGNORES}"))
@@ -198,9 +199,15 @@ class Story:
             trigger = (
                 triggers.trigger(rule.when, rule.actor, where)
                 if index == said[0]
-                else triggers.after(_event_name(rule, said[len(made) - 1]))
+                else triggers.after(_event_name(rule, said[len(made) - 1]), lasting)
             )
-            made.append(event(name, actions, trigger, rule.times))
+            over = "override" if self.dialect.minor >= 2 else "overwrite"
+            priority = "parallel" if lasting is None else over
+            made.append(event(name, actions, trigger, rule.times, priority=priority))
+            lasting = _lasting_gap(item)
+            if lasting is not None and index == said[-1]:
+                words = "the gap is kept until another action takes the speed"
+                self.notes.approximated.append((f"{where}.then[{index}]", words))
         return maneuver_group(rule.id, rule.actor, made)
 
 
@@ -235,14 +242,32 @@ def act(
     return xml("Act", *groups, start, stop, name=name)
 
 
-def event(name: str, actions: Sequence[_Element], trigger: _Element, times: int) -> _Element:
+def _lasting_gap(item: Action) -> float | None:
+    """Seconds after which an item is over whose action has no end in the standard."""
+    parts = [part.keep_gap for part in item.parts if part.keep_gap is not None]
+    return next((part.lasting for part in parts if not part.once), None)
+
+
+def event(
+    name: str,
+    actions: Sequence[_Element],
+    trigger: _Element,
+    times: int,
+    *,
+    priority: str = "parallel",
+) -> _Element:
     """``Event`` with each action under a name of its own."""
     named = [
         xml("Action", action, name=f"{name}.{number}")
         for number, action in enumerate(actions, start=1)
     ]
     return xml(
-        "Event", *named, trigger, name=name, priority="parallel", maximumExecutionCount=times
+        "Event",
+        *named,
+        trigger,
+        name=name,
+        priority=priority,
+        maximumExecutionCount=times,
     )
 
 

@@ -24,6 +24,8 @@ MOST_GROUPS: Final = 64
 """Groups of a trigger: conditions nested further are left out with a note."""
 
 
+ONLY_AHEAD: Final = "(only ahead)"
+"""In the name of a condition: the headway is that of OpenSCENARIO, and not to one behind."""
 EQUAL: Final = 0.1
 """What counts as equal, in the unit of the value: a player compares numbers as they are."""
 
@@ -91,10 +93,11 @@ class Triggers:
             ),
         )
 
-    def after(self, event: str) -> _Element:
-        """``StartTrigger`` at the end of an event."""
+    def after(self, event: str, lasting: float | None = None) -> _Element:
+        """``StartTrigger`` at the end of an event, or so many seconds after its begin."""
+        state = "completeState" if lasting is None else "startTransition"
         return xml("StartTrigger", xml("ConditionGroup", self._value_condition(
-            f"after {event}", _event_state_condition(event, "completeState"), 0.0, rising=False
+            f"after {event}", _event_state_condition(event, state), lasting or 0.0, rising=False
         )))  # fmt: skip
 
     def at_time(self, seconds: float, name: str) -> _Element:
@@ -124,7 +127,10 @@ class Triggers:
             )
         else:
             value = xml("ByValueCondition", value)
-        return self._named_condition(leaf.name or leaf.place, value, leaf.delay, rising=leaf.rising)
+        name = leaf.name or leaf.place
+        if leaf.kind == "headway" and leaf.part.ahead:
+            name = f"{name} {ONLY_AHEAD}"
+        return self._named_condition(name, value, leaf.delay, rising=leaf.rising)
 
     def _value_condition(
         self, name: str, value: _Element, delay: float, *, rising: bool
@@ -237,7 +243,9 @@ def _write_time(made: Triggers, leaf: Leaf) -> _Element:
 def _write_ttc(made: Triggers, leaf: Leaf) -> _Element:
     target = xml("TimeToCollisionConditionTarget", xml("EntityRef", entityRef=leaf.part.to))
     distance = made.dialect.distance("longitudinal")
-    return xml("TimeToCollisionCondition", target, freespace=True, **distance, **made.bound(leaf))
+    return xml(
+        "TimeToCollisionCondition", target, freespace=leaf.part.free, **distance, **made.bound(leaf)
+    )
 
 
 def _write_headway(made: Triggers, leaf: Leaf) -> _Element:
@@ -245,7 +253,7 @@ def _write_headway(made: Triggers, leaf: Leaf) -> _Element:
     return xml(
         "TimeHeadwayCondition",
         entityRef=leaf.part.to,
-        freespace=True,
+        freespace=leaf.part.free,
         **distance,
         **made.bound(leaf),
     )

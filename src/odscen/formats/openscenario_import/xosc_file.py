@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 
-from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.base.categories import Category
 from odscen.base.errors import InputError, NoMapError, NotFoundError
 from odscen.base.ids import RoadId
 from odscen.base.xml_reading import read_xml
@@ -207,14 +207,10 @@ def _begin_story(
 
 def _on_wheels(report: ImportReport, entities: Iterable[ReadEntity]) -> None:
     """Make motorcycles of pedestrians, for SUMO has none where a map has nothing to walk on."""
-    body, size = DEFAULT_BODY[Category.PEDESTRIAN], DEFAULT_BODY[Category.MOTORCYCLE]
     for entity in entities:
         if entity.category is Category.PEDESTRIAN:
-            entity.category, entity.length = Category.MOTORCYCLE, size.length
-            words = (
-                f"a motorcycle, {size.length:.1f} m long and {size.width:.1f} m wide in the place "
-                f"of {body.length:.1f} m and {body.width:.1f} m: the map has nothing to walk on"
-            )
+            entity.category, entity.sized = Category.MOTORCYCLE, True
+            words = "a motorcycle of its size: the map has nothing to walk on"
             report.mark(entity.element, "approximated", words)
 
 

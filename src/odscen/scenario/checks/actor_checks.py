@@ -6,14 +6,16 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from odscen.base.categories import DEFAULT_BODY, Body, Category
+from odscen.base.categories import Category
 from odscen.scenario.document.problems import Problem, error, warning
+from odscen.scenario.placing.bodies import ModelBodies, body_of
 from odscen.scenario.placing.region import NodePlace, Region, name_of, on_foot, turns_round
 from odscen.scenario.placing.spawn_room import SAGITTA
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from odscen.base.categories import Body
     from odscen.scenario.document.scenario_document import Actor, Flow, Scenario
 
 SPEED_MAX = {
@@ -34,7 +36,7 @@ SPEED_MIN = {
 """Below this (m/s) an actor hardly moves."""
 
 
-class AssetLookup(Protocol):
+class AssetLookup(ModelBodies, Protocol):
     """What checks ask of an asset catalogue."""
 
     def weather(self, preset: str) -> Mapping[str, float] | None:
@@ -42,18 +44,6 @@ class AssetLookup(Protocol):
 
     def category_of(self, model: str) -> Category | None:
         """Category of a model, ``None`` if there is no such model."""
-
-    def dimensions(self, model: str) -> Body | None:
-        """Size of a model, ``None`` if there is no such model."""
-
-
-def body_of(actor: Actor, assets: AssetLookup | None = None) -> Body:
-    """Size of an actor: that of its model if the catalogue knows it, else its category's usual."""
-    if assets is not None and actor.model is not None:
-        body = assets.dimensions(actor.model)
-        if body is not None:
-            return body
-    return DEFAULT_BODY[actor.category]
 
 
 @dataclass(frozen=True)

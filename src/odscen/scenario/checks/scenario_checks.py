@@ -10,7 +10,6 @@ from odscen.base.shown import some_of
 from odscen.scenario.checks.actor_checks import (
     AssetLookup,
     actor_problems,
-    body_of,
     flow_problems,
     legs,
 )
@@ -19,7 +18,7 @@ from odscen.scenario.checks.measure_checks import measure_problems
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import MOST_OF_KIND, Problem, error, limited, warning
-from odscen.scenario.placing.bodies import Box, Crowd, box_at
+from odscen.scenario.placing.bodies import Box, Crowd, body_of, box_at
 from odscen.scenario.placing.region import Region, place_of
 
 if TYPE_CHECKING:
@@ -63,7 +62,15 @@ class _Start(NamedTuple):
 
     spawn: str
     lateral_offset: float
+    longitudinal_offset: float
     body: Body
+    alone: str = ""
+    """Id of one that the story drives, and that so waits for nobody."""
+
+    @property
+    def place(self) -> tuple[str, float, str]:
+        """Where those wait behind one another who depart together."""
+        return self.spawn, self.longitudinal_offset, self.alone
 
 
 class _Window(NamedTuple):
@@ -71,21 +78,21 @@ class _Window(NamedTuple):
 
     crowd: Crowd
     known: dict[_Start, int]
-    spawns: list[str]
+    places: list[tuple[str, float, str]]
     actors: list[list[int]]
 
     def add(self, start: _Start, box: Box, actor: int) -> None:
-        label = self.known.setdefault(start, len(self.spawns))
-        if label == len(self.spawns):
-            self.spawns.append(start.spawn)
+        label = self.known.setdefault(start, len(self.places))
+        if label == len(self.places):
+            self.places.append(start.place)
             self.actors.append([])
             self.crowd.add(label, box)
         self.actors[label].append(actor)
 
-    def beside(self, spawn: str, box: Box) -> Iterator[int]:
+    def beside(self, start: _Start, box: Box) -> Iterator[int]:
         """Actors whose boxes overlap this one, but for those that wait at the same place."""
         for label in self.crowd.touching(box):
-            if self.spawns[label] != spawn:
+            if self.places[label] != start.place:
                 yield from self.actors[label]
 
 
@@ -102,12 +109,22 @@ def start_overlaps(
     for index, others in _find_overlapping(scenario, region, assets):
         actor = scenario.actors[index]
         for other in (scenario.actors[row] for row in others[: MOST_OF_KIND - found]):
+            nodes = [actor.spawn, other.spawn]
+            if actor.driver == other.driver == "story":
+                yield warning(
+                    "bodies_overlap",
+                    f"actors[{index}].spawn",
+                    f"{actor.id!r} and {other.id!r} overlap where they start: the run begins with "
+                    "their collision",
+                    nodes=nodes,
+                )
+                continue
             yield error(
                 "bodies_overlap",
                 f"actors[{index}].spawn",
                 f"{actor.id!r} and {other.id!r} overlap where they start; move one of them or "
                 "let it depart later",
-                nodes=[actor.spawn, other.spawn],
+                nodes=nodes,
             )
         found += len(others)
         if found >= MOST_OF_KIND:
@@ -123,19 +140,25 @@ def _find_overlapping(
     windows: dict[int, _Window] = {}
     boxes: dict[_Start, Box] = {}
     for index, (actor, body) in enumerate(zip(scenario.actors, bodies, strict=True)):
-        start = _Start(actor.spawn, actor.lateral_offset, body)
+        alone = actor.id if actor.driver == "story" else ""
+        start = _Start(actor.spawn, actor.lateral_offset, actor.longitudinal_offset, body, alone)
         if start not in boxes:
             place = region.place(actor.spawn)
             if place is None:
                 continue
-            nodes, aside = region.nodes_of(place), actor.lateral_offset
-            boxes[start] = box_at(nodes, place.node, body, lateral_offset=aside)
+            boxes[start] = box_at(
+                region.nodes_of(place),
+                place.node,
+                body,
+                lateral_offset=actor.lateral_offset,
+                longitudinal_offset=actor.longitudinal_offset,
+            )
         own = floor(actor.depart / SAME_TIME)
         near = [
             other
             for window in (own - 1, own, own + 1)
             if window in windows
-            for other in windows[window].beside(actor.spawn, boxes[start])
+            for other in windows[window].beside(start, boxes[start])
             if _depart_together(actor, scenario.actors[other])
         ]
         yield index, sorted(near)

@@ -29,7 +29,7 @@ from odscen.scenario.demand.expected_users import refuse_too_many
 from odscen.scenario.demand.zones import zone_segments
 from odscen.scenario.document.distributions import stream
 from odscen.scenario.document.sampling_config import PlacingRules
-from odscen.scenario.placing.bodies import Crowd, box_at
+from odscen.scenario.placing.bodies import Crowd, body_of, box_at
 from odscen.scenario.placing.sampled_places import place_at_random, vehicle_supply
 
 if TYPE_CHECKING:
@@ -485,12 +485,21 @@ def _first_crowd(
 
 def _placed_crowd(scenario: Scenario, region: Region, usable: Usable) -> Crowd:
     """Placed actors who are there from the start, with a gap about them."""
-    crowd = Crowd(2 * max(body.length + body.width for body in usable.bodies.values()))
-    for number, actor in enumerate(scenario.actors):
-        place = region.place(actor.spawn)
-        if place is not None and actor.depart < FIRST:
-            body, offset = usable.bodies[actor.category], actor.lateral_offset
-            gap = PlacingRules().minimum_gap
-            graph = region.nodes_of(place)
-            crowd.add(number, box_at(graph, place.node, body, lateral_offset=offset, gap=gap))
+    placed = [
+        (place, actor, body_of(actor) if actor.size else usable.bodies[actor.category])
+        for actor in scenario.actors
+        if actor.depart < FIRST and (place := region.place(actor.spawn)) is not None
+    ]
+    bodies = (*usable.bodies.values(), *(body for _, _, body in placed))
+    crowd = Crowd(2 * max(body.length + body.width for body in bodies))
+    for number, (place, actor, body) in enumerate(placed):
+        box = box_at(
+            region.nodes_of(place),
+            place.node,
+            body,
+            lateral_offset=actor.lateral_offset,
+            longitudinal_offset=actor.longitudinal_offset,
+            gap=PlacingRules().minimum_gap,
+        )
+        crowd.add(number, box)
     return crowd

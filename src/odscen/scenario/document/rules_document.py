@@ -66,6 +66,16 @@ class PairBounded(OwnBounded):
     to: Identifier
 
 
+class SecondsBetween(PairBounded):
+    """Seconds between two actors; ``free`` measures between the bodies, not their centres.
+
+    With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+    """
+
+    free: bool = True
+    ahead: bool = False
+
+
 class AfterTime(Part):
     """Simulated time is ``after`` seconds or more."""
 
@@ -165,8 +175,8 @@ class Condition(Part):
     model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
 
     time: AfterTime | None = None
-    ttc: PairBounded | None = None
-    headway: PairBounded | None = None
+    ttc: SecondsBetween | None = None
+    headway: SecondsBetween | None = None
     distance: DistanceBounded | None = None
     relative_speed: PairBounded | None = None
     speed: OwnBounded | None = None

@@ -338,14 +338,24 @@ class Environment(Part):
     affects_driving: bool = True
 
 
+class BodySize(Part):
+    """Bounding box of a road user, metres; without a height it has that of its category."""
+
+    length: Annotated[float, Field(ge=0.1, le=30)]
+    width: Annotated[float, Field(ge=0.1, le=5)]
+    height: Annotated[float, Field(ge=0.1, le=10)] | None = None
+
+
 class Actor(Part):
     """One road user, placed by hand or sampled.
 
     ``category`` is always given; ``model`` may name a blueprint of that category. ``goal`` ``None``
     draws one of the candidates by the scenario's seed. ``speed`` is the desired speed; ``None`` is
     the limit (vehicles) or the category's usual walking speed (pedestrians). ``lateral_offset`` is
-    positive to the left of the driving direction. ``style`` is a driving style or the id of a
-    driver set of the scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
+    positive to the left of the driving direction, ``longitudinal_offset`` in it: metres from the
+    node to the centre of the body. ``size`` is that of its body; ``None`` is that of its model, or
+    the usual one of its category. ``style`` is a driving style or the id of a driver set of the
+    scenario. ``initial_speed`` is a vehicle's speed at departure, m/s;
     ``None`` is from rest. ``via`` are nodes that its route leads through on its way to the goal, in
     their order; an open goal is one that can be reached from the last of them. ``driver`` is who
     drives a vehicle that no rule moves: SUMO, or the ``story`` alone, which keeps its initial speed
@@ -360,6 +370,8 @@ class Actor(Part):
     via: Annotated[tuple[Label, ...], Field(max_length=50)] = ()
     speed: Speed | None = None
     lateral_offset: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    longitudinal_offset: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    size: BodySize | None = None
     depart: Seconds = 0.0
     initial_speed: InitialSpeed | None = None
     style: Identifier = "normal"

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from itertools import product
 from math import cos, floor, hypot, sin
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+from odscen.base.categories import DEFAULT_BODY, Body
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from odscen.base.categories import Body
     from odscen.lanegraph.graphs import LaneGraph, PedestrianGraph
+    from odscen.scenario.document.scenario_document import Actor
 
 LEVEL_HEIGHT = 3.0
 """Bodies whose places differ by more than this in height (m) are on different levels."""
@@ -25,6 +27,25 @@ SIDE_GAP = 0.2
 """Free width kept between two sampled bodies side by side, metres."""
 _AROUND = sorted(product((-1, 0, 1), repeat=2), key=lambda step: abs(step[0]) + abs(step[1]))
 """A cell of the grid and those around it, as steps from it: the likeliest first."""
+
+
+class ModelBodies(Protocol):
+    """What has the sizes of models."""
+
+    def dimensions(self, model: str) -> Body | None:
+        """Size of a model, ``None`` if there is no such model."""
+
+
+def body_of(actor: Actor, assets: ModelBodies | None = None) -> Body:
+    """Size of an actor: its own, that of its model if the catalogue knows it, or the usual one."""
+    usual = DEFAULT_BODY[actor.category]
+    if actor.size is not None:
+        return Body(actor.size.length, actor.size.width, actor.size.height or usual.height)
+    if assets is not None and actor.model is not None:
+        body = assets.dimensions(actor.model)
+        if body is not None:
+            return body
+    return usual
 
 
 class Box(NamedTuple):
@@ -50,9 +71,10 @@ def box_at(
     body: Body,
     *,
     lateral_offset: float = 0.0,
+    longitudinal_offset: float = 0.0,
     gap: float | None = None,
 ) -> Box:
-    """Box of a body whose centre is on a node, shifted to the left by ``lateral_offset`` metres.
+    """Box of a body whose centre is on a node, but for its offsets to the left and ahead (m).
 
     With a ``gap``, the box is grown so that two boxes that do not overlap leave that much free
     length between the bodies, and :data:`SIDE_GAP` of free width.
@@ -60,8 +82,8 @@ def box_at(
     hdg = float(graph.hdg[node])
     ux, uy = cos(hdg), sin(hdg)
     return Box(
-        float(graph.x[node]) - uy * lateral_offset,
-        float(graph.y[node]) + ux * lateral_offset,
+        float(graph.x[node]) - uy * lateral_offset + ux * longitudinal_offset,
+        float(graph.y[node]) + ux * lateral_offset + uy * longitudinal_offset,
         float(graph.z[node]),
         ux,
         uy,

@@ -46,6 +46,9 @@ class GenerationSettings:
     config: SamplingConfig = field(default_factory=SamplingConfig)
 
     def __post_init__(self) -> None:
+        for name, value in (("count", self.count), ("seed", self.seed)):
+            if not isinstance(value, int) or isinstance(value, bool):
+                raise InputError(f"{name} must be a whole number, not {value!r}")
         if self.count < 1:
             raise InputError(f"count must be at least 1, not {self.count}")
         if not 0 <= self.seed <= _LAST_SEED - self.count + 1:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         OwnBounded,
         PairBounded,
         Reaching,
+        SecondsBetween,
         SignalShows,
         Standing,
         Touching,
@@ -214,21 +215,29 @@ def _read_time(part: AfterTime, _: str, view: RoadView) -> Reading:
     return Reading(view.time, view.time - part.after, 1.0)
 
 
-def _read_ttc(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
+def _read_ttc(part: SecondsBetween, actor: str, view: RoadView) -> Reading | None:
     if (both := _pair_of_condition(part, actor, view)) is None:
         return None
     found = _measure_lengthwise(*both)
-    return _read_seconds(part, max(found.gap, 0.0), found.closing)
+    if part.ahead and found.behind is not both[0]:
+        return Reading(math.inf, NEVER)
+    return _read_seconds(part, _gap_of(part, found), found.closing)
 
 
-def _read_headway(part: PairBounded, actor: str, view: RoadView) -> Reading | None:
+def _read_headway(part: SecondsBetween, actor: str, view: RoadView) -> Reading | None:
     if (both := _pair_of_condition(part, actor, view)) is None:
         return None
     found = _measure_lengthwise(*both)
+    if part.ahead and found.behind is not both[0]:
+        return Reading(math.inf, NEVER)
     if part.above is not None and found.behind.speed <= _STILL:
         # A stopped vehicle has no headway, so it is not above a bound either.
         return Reading(math.inf, NEVER)
-    return _read_seconds(part, max(found.gap, 0.0), found.behind.speed)
+    return _read_seconds(part, _gap_of(part, found), found.behind.speed)
+
+
+def _gap_of(part: SecondsBetween, found: _LengthwiseGap) -> float:
+    return max(found.gap, 0.0) if part.free else abs(found.ahead)
 
 
 def _read_seconds(part: PairBounded, gap: float, speed: float) -> Reading:
@@ -386,13 +395,15 @@ CONDITIONS = {
             _MIRRORED, _read_time,
         ),
         ConditionKind(
-            "ttc", "time to collision of two actors: gap between the bodies along the heading, "
-            "over the speed at which it closes", "s", _EXTRAPOLATED, "TimeToCollisionCondition",
+            "ttc", "time to collision of two actors: gap between the bodies (without `free` the "
+            "centres) along the heading, over the speed at which it closes; with `ahead` only "
+            "while `to` is ahead", "s", _EXTRAPOLATED, "TimeToCollisionCondition",
             _MIRRORED, _read_ttc,
         ),
         ConditionKind(
-            "headway", "time headway: gap between the bodies along the heading, over the speed of "
-            "the one behind; none while it is stopped", "s", _EXTRAPOLATED,
+            "headway", "time headway: gap between the bodies (without `free` the centres) along "
+            "the heading, over the speed of the one behind; none while it is stopped, with `ahead` "
+            "only while `to` is ahead", "s", _EXTRAPOLATED,
             "TimeHeadwayCondition", _MIRRORED, _read_headway,
         ),
         ConditionKind(

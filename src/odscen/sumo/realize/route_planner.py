@@ -122,7 +122,13 @@ class RoutePlanner:
         self._places = places
 
     def plan(
-        self, path: Int32Array, *, length: float, vclass: str, lateral_offset: float = 0.0
+        self,
+        path: Int32Array,
+        *,
+        length: float,
+        vclass: str,
+        lateral_offset: float = 0.0,
+        longitudinal_offset: float = 0.0,
     ) -> Route:
         """Route of a vehicle of this length along a path of the lane graph.
 
@@ -136,6 +142,8 @@ class RoutePlanner:
             SUMO's vehicle class.
         lateral_offset
             Metres to the left.
+        longitudinal_offset
+            Metres ahead of the first node.
 
         Raises
         ------
@@ -146,7 +154,8 @@ class RoutePlanner:
         # The arrival first: it may add the edge that the front stands on the way to.
         edges, arrival_lane, arrival_pos = self._place_arrival(edges, path, vclass, length)
         edges, start, pos = self._anchor_spawn(path, edges, vclass)
-        ahead = length / 2.0 * self._places.scales[start.id]
+        ahead = (length / 2.0 + longitudinal_offset) * self._places.scales[start.id]
+        pos = max(pos, -ahead)  # a front behind the beginning of its lane is on none
         if pos + ahead > start.length + CLAMP and not self._next_lanes(start, edges):
             edges, told = self._leave_along_link(start, edges, vclass)
             repairs += told

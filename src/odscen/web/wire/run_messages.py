@@ -118,7 +118,8 @@ class RunInfo(Answer):
     ``finished`` is when its results were written, in seconds since 1970. ``preparing`` says how far
     routes by travel time have been found before it begins. ``carla`` says that it is
     shown on a CARLA server, whose camera can then be watched. A long run that has not ended has
-    ``slices``; one that is ``interrupted`` can go on from the last of them.
+    ``slices``; one that is ``interrupted`` can go on from the last of them. ``clock`` is the time
+    of day at the start, seconds, while the server still has the scenario (see ``RunContent``).
     """
 
     run: str
@@ -133,6 +134,7 @@ class RunInfo(Answer):
     carla: bool = False
     slices: RunSlices | None = None
     preparing: str | None = None
+    clock: float | None = None
 
 
 class RunFile(Answer):
@@ -211,11 +213,13 @@ class RunCurves(Answer):
 class RunContent(Answer):
     """``digest`` is the same where scenarios differ at most in name and description.
 
-    ``counts`` is how many counts of vehicles the scenario has.
+    ``counts`` is how many counts of vehicles the scenario has, ``clock`` the time of day at the
+    start, seconds, 0 without one.
     """
 
     digest: str
     counts: int
+    clock: float = 0.0
 
 
 _One = TypeVar("_One")

@@ -286,18 +286,19 @@ def test_a_vehicle_that_starts_beside_all_lanes_is_there_a_step_later(
 
 
 @pytest.mark.parametrize(
-    ("s", "spawn", "metres"), [(51, "0.0.-1.22", 6), (54, "0.0.-1.21", 12), (60, "0.0.-1.30", 0)]
+    ("s", "spawn", "ahead", "overlap"),
+    [(51, "0.0.-1.25", 0.0, 1), (54, "0.0.-1.27", -1.0, 1), (60, "0.0.-1.30", -1.0, 0)],
 )
-def test_two_that_start_on_one_ground_start_behind_one_another(
-    workspace: Workspace, tmp_path: Path, s: float, spawn: str, metres: int
+def test_those_whom_the_story_drives_overlap_at_first_where_the_file_has_it(
+    workspace: Workspace, tmp_path: Path, s: float, spawn: str, ahead: float, overlap: int
 ) -> None:
+    """The centre of the ego is on node 25, at s = 51 m."""
     found = read(workspace, tmp_path, init=f"{at_first(place(s))}</Private>")
     ego, other = found.scenario.actors
-    assert ego.spawn == "0.0.-1.25"
-    assert other.spawn == spawn
-    words = f"about {metres} m behind, as another one starts there"
-    assert (words in reasons(found, "approximated")) == (metres > 0)
-    assert [one for one in found.problems if one.severity == "error"] == []
+    assert (ego.spawn, ego.longitudinal_offset) == ("0.0.-1.25", 0.0)
+    assert (other.spawn, other.longitudinal_offset) == (spawn, ahead)
+    said = [(one.code, one.severity) for one in found.problems if one.code == "bodies_overlap"]
+    assert said == [("bodies_overlap", "warning")] * overlap
 
 
 @pytest.mark.parametrize(("ahead", "refused"), [(0, 0), (5, 2)])

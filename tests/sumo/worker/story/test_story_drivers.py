@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from odscen.base.categories import Category
+from odscen.figures.judging.criteria import criteria_rows
+from odscen.lanegraph.query import node_index
+from odscen.runs.judged import read_judged
 from odscen.scenario.checks.scenario_checks import check
 from tests.sumo.story_case import (
     MIDDLE,
@@ -92,3 +96,76 @@ def test_the_story_drives_no_pedestrian() -> None:
         scenario.model_copy(update={"actors": (walker,)}), loaded(MOTORWAY).sumo.graph, None
     )
     assert ("driver_not_possible", "actors[0].driver") in [(one.code, one.where) for one in found]
+
+
+SUPERMINI = {"length": 4.2, "width": 1.75}
+
+
+def test_bodies_have_their_size_and_start_exactly_where_they_are_put(tmp_path: Path) -> None:
+    """CCRs with an overlap of 50 %: a free gap of 30 m, closed at 12 m/s after 2.5 s."""
+    first, second = node_at(MOTORWAY, 370.0, MIDDLE), node_at(MOTORWAY, 405.0, MIDDLE)
+    lanes = loaded(MOTORWAY).sumo.graph.lanes
+    apart = float(lanes.x[node_index(loaded(MOTORWAY).sumo.graph, second)]) - float(
+        lanes.x[node_index(loaded(MOTORWAY).sumo.graph, first)]
+    )
+    free = 30.0 + SUPERMINI["length"] - apart
+    actors = [
+        car("ego", 370.0, 12.0, ego=True, size=SUPERMINI),
+        car(
+            "other", 405.0, 0.0, size=SUPERMINI, longitudinal_offset=free,
+            lateral_offset=SUPERMINI["width"] / 2.0,
+        ),
+    ]  # fmt: skip
+    found = run(document(MOTORWAY, actors, [], until=5.0), tmp_path / "run")
+    assert found.tracks["ego"].length == 4.2
+    assert gap_at_start(found) == pytest.approx(30.0, abs=0.01)
+    [hit] = [one for one in found.events if one.kind == "collision"]
+    assert hit.time == pytest.approx(2.5, abs=0.01)
+    assert (hit.values or {})["overlap"] == pytest.approx(0.5, abs=0.01)
+    texts = (
+        "impact_speed(ego) >= 11.99",
+        "impact_overlap(ego) >= 0.49",
+        "min_distance(ego,other) > 0",
+        "stopped(ego) == 1",
+    )
+    rows = criteria_rows(texts, {}, read_judged(tmp_path / "run"))
+    assert [row["passed"] for row in rows] == [True, True, False, False]
+    assert [row["value"] for row in rows] == pytest.approx([12.0, 0.5, 0.0, 0.0], abs=0.01)
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_the_instant_and_place_of_an_impact_while_braking_are_those_of_the_closed_form(
+    tmp_path: Path, step: float
+) -> None:
+    """CCRb: from 20 m/s with 4 m/s² after 1 s, onto a stopped car some 60 m ahead."""
+    actors = [car("ego", 370.0, 20.0, ego=True), car("other", 435.0, 0.0)]
+    rules = [after(1.0, {"brake": {"by": 4.0}})]
+    found = run(document(MOTORWAY, actors, rules, step=step, until=8.0), tmp_path / "run")
+    gap = gap_at_start(found)
+    [hit] = [one for one in found.events if one.kind == "collision"]
+    braked = (20.0 - math.sqrt(400.0 - 8.0 * (gap - 20.0))) / 4.0
+    assert hit.time == pytest.approx(1.0 + braked, abs=0.05)
+    assert (hit.values or {})["impact_speed"] == pytest.approx(20.0 - 4.0 * braked, abs=0.2)
+    other = found.tracks["other"]
+    assert hit.x == pytest.approx(other.x[0] - other.length, abs=0.05)
+
+
+def test_who_overlaps_at_first_is_told_and_those_whom_the_story_drives_may(tmp_path: Path) -> None:
+    actors = [
+        car("ego", 370.0, 12.0, ego=True),
+        car("other", 374.0, 12.0, longitudinal_offset=-1.0),
+    ]
+    scenario = document(MOTORWAY, actors, [], until=2.0)
+    graph = loaded(MOTORWAY).sumo.graph
+    [told] = [one for one in check(scenario, graph, None) if one.code == "bodies_overlap"]
+    assert (told.severity, told.where) == ("warning", "actors[1].spawn")
+    found = run(scenario, tmp_path / "run")
+    assert found.tracks["other"].x[0] - found.tracks["ego"].x[0] == pytest.approx(3.0, abs=0.01)
+    assert [one.kind for one in found.events if one.kind == "collision"] == ["collision"]
+    driven = [car("ego", 370.0, 12.0, driver="sumo"), actors[1] | {"driver": "sumo"}]
+    [refused] = [
+        one
+        for one in check(document(MOTORWAY, driven, [], until=2.0), graph, None)
+        if one.code == "bodies_overlap"
+    ]
+    assert refused.severity == "error"

@@ -176,6 +176,24 @@ class PositionReader:
 
     def along(self, node: int, metres: float) -> int:
         """Node so many metres on along the lanes, straight on at forks; back if negative."""
+        return self._node_and_rest(node, metres)[0]
+
+    def point_along(self, node: int, metres: float, left: float = 0.0) -> MapPoint:
+        """Point so many metres on along the lanes as of :meth:`along`, and to the left of them."""
+        there, rest = self._node_and_rest(node, metres)
+        lanes = self.graph.lanes
+        at = MapPoint(float(lanes.x[there]), float(lanes.y[there]), float(lanes.hdg[there]), there)
+        return at.moved(rest, left)
+
+    def ahead_of(self, node: int, point: MapPoint) -> float:
+        """Metres that a point is ahead of a node along its lane."""
+        lanes = self.graph.lanes
+        dx, dy = point.x - float(lanes.x[node]), point.y - float(lanes.y[node])
+        hdg = float(lanes.hdg[node])
+        return dx * math.cos(hdg) + dy * math.sin(hdg)
+
+    def _node_and_rest(self, node: int, metres: float) -> tuple[int, float]:
+        """Node nearest to so many metres on along the lanes, and the metres from there."""
         lanes = self.graph.lanes
         ends = (lanes.source, lanes.target) if metres >= 0 else (lanes.target, lanes.source)
         left, seen = abs(metres), {node}
@@ -191,7 +209,7 @@ class PositionReader:
             left -= float(lanes.length[edge])
             node = following
             seen.add(node)
-        return node
+        return node, left if metres >= 0 else -left
 
     def beside(self, node: int, by: int) -> int | None:
         """Node abreast whose lane id differs by so many, 0 left out; ``None`` if there is none."""
@@ -324,22 +342,20 @@ class PositionReader:
         lanes = self.graph.lanes
         forward = bool(lanes.lanes.forward[int(lanes.lane[beside])])
         offset = self.report.number(kind, "offset", 0.0)
-        there = self.along(beside, metres if forward else -metres)
+        ahead = self.ahead_of(node, self.of_entity(kind)) + (metres if forward else -metres)
+        left = offset if forward else -offset
         if not isinstance(self._traced_metres(beside, metres), TracedNumber):
-            return self._point_at_node(there, None, offset)
-        base, here = self.of_entity(kind), self._point_at_node(beside, None, offset)
-        ahead = (base.x - here.x) * math.cos(here.hdg) + (base.y - here.y) * math.sin(here.hdg)
-        return here.moved(ahead + (metres if forward else -metres))._replace(node=there)
+            return self.point_along(beside, float(ahead), float(left))
+        here = self._point_at_node(beside, None, offset)
+        return here.moved(ahead)._replace(node=self.along(beside, float(ahead)))
 
     def _relative_road(self, kind: _Element) -> MapPoint:
         node, base = self._base_node(kind), self.of_entity(kind)
         lanes = self.graph.lanes
         metres, left = (self.report.number(kind, name, 0.0) for name in ("ds", "dt"))
         side = 1.0 if bool(lanes.lanes.forward[int(lanes.lane[node])]) else -1.0
-        there = self._point_at_node(self.along(node, side * metres))
-        here = self._point_at_node(node)
-        off = (base.y - here.y) * math.cos(here.hdg) - (base.x - here.x) * math.sin(here.hdg)
-        return there.moved(0.0, off + side * left)._replace(node=None)
+        ahead, off = self.ahead_of(node, base), self.left_of(node, base)
+        return self.point_along(node, ahead + side * metres, off + side * left)._replace(node=None)
 
     def _relative_world(self, kind: _Element) -> MapPoint:
         base = self.of_entity(kind)
@@ -367,14 +383,31 @@ class PositionReader:
             self.report.mark(element, "approximated", "taken along the lane of the first waypoint")
         base = self.point(places[0])
         node = self.node_near(base) if base.node is None else base.node
-        metres = self.report.number(inside, "pathS")
-        there = self.along(node, metres)
-        if inside.tag == "FromLaneCoordinates":
-            return self._point_at_node(there)
+        metres = self.ahead_of(node, base) + self.report.number(inside, "pathS")
+        there = self.point_along(node, metres)
+        if there.node is None:
+            raise AssertionError(there)
         lanes = self.graph.lanes
-        key = lanes.lanes.keys[int(lanes.lane[there])]
+        key = lanes.lanes.keys[int(lanes.lane[there.node])]
+        if inside.tag == "FromLaneCoordinates":
+            return self._in_lane(inside, there)
         t = self.side * self.report.number(inside, "t", 0.0)
-        return self._on_road(kind, key.road, float(lanes.s[there]), t)
+        s = float(lanes.s[there.node]) + self.ahead_of(there.node, there)
+        return self._on_road(kind, key.road, s, t)
+
+    def _in_lane(self, inside: _Element, at: MapPoint) -> MapPoint:
+        """Where a point lies on the lane of a road whose id an element gives, and its offset."""
+        node, lanes = at.node or 0, self.graph.lanes
+        key = lanes.lanes.keys[int(lanes.lane[node])]
+        lane = int(self.report.number(inside, "laneId", key.lane))
+        other = self._find_node(key.road, lane, float(lanes.s[node]), section=key.section)
+        if other is None:
+            raise RefusedError(inside, f"road {key.road!r} has no driving lane {lane}")
+        offset = self.side * self.report.number(inside, "laneOffset", 0.0)
+        forward = bool(lanes.lanes.forward[int(lanes.lane[other])])
+        same = math.cos(float(lanes.hdg[other]) - at.hdg) > 0.0
+        here = self._point_at_node(other, None, offset)
+        return here.moved(self.ahead_of(node, at) * (1.0 if same else -1.0)) if forward else here
 
 
 @dataclass(frozen=True, slots=True, init=False)

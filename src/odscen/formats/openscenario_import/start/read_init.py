@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
 from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.places.map_points import MapPoint
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
+    from odscen.base.categories import Body
     from odscen.formats.openscenario_import.import_report import ImportReport
     from odscen.formats.openscenario_import.places.read_positions import PositionReader
     from odscen.formats.openscenario_import.story.read_storyboard import StoryReader
@@ -139,7 +140,7 @@ class ActorPlaces:
     def __init__(self, report: ImportReport, positions: PositionReader) -> None:
         self._report = report
         self._positions = positions
-        self._bodies: list[tuple[MapPoint, Category]] = []
+        self._bodies: list[tuple[MapPoint, Body]] = []
 
     def leave_room(self, entity: ReadEntity, made: dict[str, Any], taken: set[str]) -> None:
         """Let an actor start behind one whose node or ground it would have."""
@@ -156,7 +157,7 @@ class ActorPlaces:
             node = None if back == node else back
         if node is None:
             return
-        self._bodies.append((self._centre_at(node, left), entity.category))
+        self._bodies.append((self._centre_at(node, left), entity.body))
         if steps == 0:
             return
         made["spawn"] = str(node_id(graph, node))
@@ -171,9 +172,8 @@ class ActorPlaces:
 
     def _overlaps_earlier(self, entity: ReadEntity, node: int, left: float) -> bool:
         """Whether the body of an actor at a node would have ground of one that starts before."""
-        own, size = self._centre_at(node, left), DEFAULT_BODY[entity.category]
-        for other, category in self._bodies:
-            body = DEFAULT_BODY[category]
+        own, size = self._centre_at(node, left), entity.body
+        for other, body in self._bodies:
             dx, dy = own.x - other.x, own.y - other.y
             along = abs(dx * math.cos(other.hdg) + dy * math.sin(other.hdg))
             across = abs(dy * math.cos(other.hdg) - dx * math.sin(other.hdg))
@@ -240,22 +240,24 @@ class ActorPlaces:
         return then
 
     def vehicle(self, entity: ReadEntity, centre: MapPoint) -> dict[str, Any]:
-        """Node nearest to the centre of the body, and the offset from it to the left."""
+        """Node nearest to the centre of the body, and the offsets from it."""
         graph, lanes = self._positions.graph, self._positions.graph.lanes
         node = self._positions.node_near(centre)
         dx, dy = centre.x - float(lanes.x[node]), centre.y - float(lanes.y[node])
         hdg = float(lanes.hdg[node])
         along = dx * math.cos(hdg) + dy * math.sin(hdg)
         left = dy * math.cos(hdg) - dx * math.sin(hdg)
-        report = self._report
-        if abs(along) > 0.01 and not isinstance(along, TracedNumber):
-            words = f"it starts {abs(along):.2f} m along its lane from there, on a node"
-            report.mark(entity.element, "approximated", words)
+        ahead = 0.0 if isinstance(along, TracedNumber) else round(along, 4)
+        if abs(ahead) > _BESIDE:  # behind the beginning of all lanes, or beyond their end
+            words = f"{abs(along):.2f} m along its lane from there, where that begins or ends"
+            self._report.mark(entity.element, "approximated", words)
+            ahead = 0.0
         goal = self._positions.along(node, _FAR)
         return {
             "spawn": str(node_id(graph, node)),
             "goal": str(node_id(graph, goal)),
             "lateral_offset": round(left, 3),
+            **({"longitudinal_offset": ahead} if ahead else {}),
         }
 
 
@@ -369,12 +371,10 @@ class InitReader:
             metres += entity.ahead - other.ahead if leads else other.ahead - entity.ahead
         ahead = (mine.x - its.x) * math.cos(its.hdg) + (mine.y - its.y) * math.sin(its.hdg)
         node = positions.node_near(mine)
-        there = positions.along(node, (metres if leads else -metres) - ahead)
-        lanes = self._positions.graph.lanes
-        x, y = float(lanes.x[there]), float(lanes.y[there])
-        at = MapPoint(x, y, float(lanes.hdg[there])).moved(-entity.ahead)
-        positions.starts[name] = at
-        words = f"it starts on the node nearest to {metres:.2f} m {'ahead' if leads else 'behind'}"
+        metres_on = positions.ahead_of(node, mine) + (metres if leads else -metres) - ahead
+        at = positions.point_along(node, metres_on, positions.left_of(node, mine))
+        positions.starts[name] = at.moved(-entity.ahead)
+        words = f"it starts {metres:.2f} m {'ahead' if leads else 'behind'}"
         report.mark(gap, "approximated", f"{words}, from centre to centre")
 
     def actors(self, driven: frozenset[str]) -> list[dict[str, Any]]:
@@ -402,7 +402,8 @@ class InitReader:
                 else:
                     report.mark(error.element, "refused", error.reason)
                 continue
-            if entity.own is None:  # others of ours may depart later from one place
+            if entity.own is None and made.get("driver") != "story":
+                # ... whom SUMO does not let start in another; ours may depart later from there
                 self._places.leave_room(entity, made, {str(actor["spawn"]) for actor in found})
             found.append(made)
             self.placed.add(entity.id)
@@ -426,7 +427,10 @@ class InitReader:
         by_rule = entity.id in self._appear.late - self._appear.departing
         if start is not None and there is not None and not by_rule:
             centre = start.moved(entity.ahead)
-            where = there.moved(0.0, float(made.get("lateral_offset", 0.0)))
+            where = there.moved(
+                float(made.get("longitudinal_offset", 0.0)),
+                float(made.get("lateral_offset", 0.0)),
+            )
             if centre.away(where) > _SAME_PLACE:
                 walks = entity.category is Category.PEDESTRIAN
                 found = (
@@ -453,6 +457,8 @@ class InitReader:
         # What takes time begins from a standstill, which entities are at before the first action.
         first = speed if all(change.get("shape") == "step" for change in changes) else 0.0
         made: dict[str, Any] = {"id": entity.id, "category": str(entity.category)}
+        if entity.sized:
+            made["size"] = entity.body._asdict()
         if entity.category is Category.PEDESTRIAN:
             made |= self._places.walker(centre)
             then = then or [{"stop": {}}]

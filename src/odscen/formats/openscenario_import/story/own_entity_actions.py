@@ -30,7 +30,9 @@ def own_entity_action(
     at, own = positions.point(position).moved(entity.ahead), entity.own or {}
     start = positions.of_node(own.get("spawn", ""))
     if start is not None:
-        start = start.moved(0.0, float(own.get("lateral_offset", 0.0)))
+        start = start.moved(
+            float(own.get("longitudinal_offset", 0.0)), float(own.get("lateral_offset", 0.0))
+        )
         if at.away(start) < _SAME and abs(at.hdg - start.hdg) < _SAME:
             return {"appear": {}}
     return {"appear": {"at": [round(value, 4) for value in (at.x, at.y, at.hdg)]}}

@@ -92,7 +92,6 @@ _SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}
 _MEASURES: Final = {"time": "over", "rate": "rate", "distance": "within"}
 FOLLOWING: Final = "following"
 """Key of actions that follow one another, of one action of the file."""
-_CAR_WIDTH: Final = 1.8
 _USUAL: Final = 3.0
 """Seconds of a lateral action that gives no measure that can be turned into some."""
 IGNORED: Final = frozenset(
@@ -330,7 +329,9 @@ def _read_abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Mad
     side = sides.get(kind.get("displacement", "any"), math.copysign(1.0, left))
     wanted = report.number(kind, "distance", abs(left))
     if kind.get("freespace") == "true":
-        wanted += _CAR_WIDTH
+        wanted += (
+            entity.body.width + read.conditions.entities[kind.get("entityRef", "")].body.width
+        ) / 2
     to = min(max(positions.beside_lane(own) - left + side * wanted, -10.0), 10.0)
     words = f"{to:.2f} m from its own lane, if the other one stays in the lane in which it starts"
     report.mark(kind, "approximated", words)

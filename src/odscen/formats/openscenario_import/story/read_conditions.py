@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from odscen.formats.openscenario.xosc_triggers import EQUAL
+from odscen.formats.openscenario.xosc_triggers import EQUAL, ONLY_AHEAD
 from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.source.own_files import without_repeats
 from odscen.formats.openscenario_import.world.read_environment import clock_of
@@ -25,6 +25,7 @@ Made = dict[str, Any]
 ALWAYS: Final[Made] = {"time": {"after": 0.0}}
 NEVER: Final[Made] = {"not": ALWAYS}
 _TRUTH: Final = {"true": "1", "false": "0"}
+_SAME_AXLE: Final = 0.01
 _ROAD_END: Final = 10.0
 _FAR: Final = 100_000.0
 """Metres."""
@@ -308,9 +309,28 @@ def _read_reaches(read: ConditionReader, kind: _Element, of: str) -> Made:
 
 
 def _read_headway(read: ConditionReader, kind: _Element, of: str) -> Made:
-    if kind.get("freespace") == "false":
-        read.report.mark(kind, "approximated", "between bodies, not reference points")
-    return read.bounded(kind, "headway", {"of": of, "to": read.actor(kind)})
+    part = _read_pair(read, kind, of, read.actor(kind))
+    # Where the other one is behind, the standard has no headway; rules of odscen's have one.
+    if not read.own or ONLY_AHEAD in _name_of_condition(kind):
+        part["ahead"] = True
+    return read.bounded(kind, "headway", part)
+
+
+def _read_pair(read: ConditionReader, kind: _Element, of: str, to: str) -> Made:
+    """Who is meant, and whether seconds are between bodies or, as here, their centres."""
+    if kind.get("freespace") == "true":
+        return {"of": of, "to": to}
+    entities = {one.id: one for one in read.entities.values()}
+    apart = abs(entities[to].ahead - entities[of].ahead) if {of, to} <= {*entities} else 0.0
+    if apart > _SAME_AXLE:
+        words = f"between centres, not reference points: up to {apart:.2f} m otherwise"
+        read.report.mark(kind, "approximated", words)
+    return {"of": of, "to": to, "free": False}
+
+
+def _name_of_condition(kind: _Element) -> str:
+    condition = next(kind.iterancestors("Condition"), None)
+    return "" if condition is None else condition.get("name", "")
 
 
 def _read_ttc(read: ConditionReader, kind: _Element, of: str) -> Made:
@@ -318,9 +338,7 @@ def _read_ttc(read: ConditionReader, kind: _Element, of: str) -> Made:
     other = read.report.child(target, "EntityRef")
     if other is None:
         raise RefusedError(target, "time to collision with a place")
-    if kind.get("freespace") == "false":
-        read.report.mark(kind, "approximated", "between bodies, not reference points")
-    return read.bounded(kind, "ttc", {"of": of, "to": read.actor(other)})
+    return read.bounded(kind, "ttc", _read_pair(read, kind, of, read.actor(other)))
 
 
 def _read_measure(read: ConditionReader, kind: _Element, usual: str) -> Made:

@@ -218,6 +218,7 @@ class StoryReader:
         for event in events[1:]:
             for trigger in self.report.children(event, "StartTrigger"):
                 self.report.take(trigger)
+                self._end_gap(rule["then"][-1], trigger)
             try:
                 then = self._read_then(event, self.entities[name])
             except RefusedError as error:
@@ -226,6 +227,16 @@ class StoryReader:
             if then:
                 rule["then"] += then if len(then) == 1 else [{"together": then}]
             self._made[event] = [rule]
+
+    def _end_gap(self, before: Made, trigger: _Element) -> None:
+        """Let a gap last as long as the event after it waits, counted from its begin."""
+        condition = next(trigger.iter("Condition"), None)
+        state = next(trigger.iter("StoryboardElementStateCondition"), None)
+        if condition is None or state is None or state.get("state") != "startTransition":
+            return
+        for action in (before, *before.get("together", ())):
+            if "keep_gap" in action:
+                action["keep_gap"]["lasting"] = self.report.number(condition, "delay", 0.0)
 
     def _read_event(self, event: _Element, trigger: _Element | None, names: list[str]) -> None:
         before = len(self.rules)

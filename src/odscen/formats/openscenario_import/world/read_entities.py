@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.base.categories import DEFAULT_BODY, Body, Category
 from odscen.formats.openscenario_import.source.own_files import is_own, own_fields
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ _CATEGORIES: Final = {
     "motorbike": Category.MOTORCYCLE,
     "bicycle": Category.BICYCLE,
 }
+_LARGEST: Final = Body(30.0, 5.0, 10.0)
+"""Metres, as of scenarios."""
 _NEAREST: Final = {"semitrailer": Category.TRUCK, "trailer": Category.TRUCK}
 EGO: Final = re.compile(r"ego|hero|ego_vehicle|host|vut", re.IGNORECASE)
 
@@ -30,6 +32,8 @@ EGO: Final = re.compile(r"ego|hero|ego_vehicle|host|vut", re.IGNORECASE)
 class ReadEntity:
     """An entity of the file; ``ahead`` is from its reference point to its centre, metres.
 
+    ``body`` is its size, ``sized`` whether the file says it.
+
     ``own`` are fields of an actor, in a file that odscen wrote. ``controlled`` says whether the
     file assigns a controller to it anywhere.
     """
@@ -37,12 +41,18 @@ class ReadEntity:
     element: _Element
     id: str
     category: Category
-    length: float
+    body: Body
     ahead: float
+    sized: bool = False
     ego: bool = False
     obstacle: bool = False
     controlled: bool = False
     own: dict[str, Any] | None = None
+
+    @property
+    def length(self) -> float:
+        """Of its body, metres."""
+        return self.body.length
 
 
 def plain_id(text: str, taken: set[str]) -> str:
@@ -116,15 +126,26 @@ def _read_entity(report: ImportReport, thing: _Element, own: str) -> ReadEntity 
     if category is None:
         report.mark(thing, "refused", f"vehicles of category {kind!r}")
         return None
-    length, ahead = DEFAULT_BODY[category].length, 0.0
+    body, ahead, sized = DEFAULT_BODY[category], 0.0, False
     box = report.child(thing, "BoundingBox")
     if box is not None:
         centre, size = report.child(box, "Center"), report.child(box, "Dimensions")
         if centre is not None:
             ahead = report.number(centre, "x", 0.0)
         if size is not None:
-            given = report.number(size, "length", length)
-            if abs(given - length) > 0.05:
-                words = f"{given:.2f} m long; the usual {category} has {length:.2f} m"
-                report.mark(size, "approximated", words)
-    return ReadEntity(thing, own, category, length, ahead, obstacle=thing.tag == "MiscObject")
+            body, sized = _read_size(report, size, body), True
+    obstacle = thing.tag == "MiscObject"
+    return ReadEntity(thing, own, category, body, ahead, sized, obstacle=obstacle)
+
+
+def _read_size(report: ImportReport, size: _Element, usual: Body) -> Body:
+    """Size of a box, within what bodies can have."""
+    given = [float(report.number(size, name, getattr(usual, name))) for name in Body._fields]
+    used = [min(max(value, 0.1), most) for value, most in zip(given, _LARGEST, strict=True)]
+    if used != given:
+        long, wide, high = used
+        words = (
+            f"{long:g} m long, {wide:g} m wide and {high:g} m high: no body is larger or smaller"
+        )
+        report.mark(size, "approximated", words)
+    return Body(*used)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from odscen.base.categories import DEFAULT_BODY, Body
+from odscen.base.categories import DEFAULT_BODY
+from odscen.scenario.placing.bodies import ModelBodies, body_of
 from odscen.sumo.realize.driving import driver, factor_of, kind_of
 from odscen.sumo.realize.weather_effects import NO_EFFECT, weather_effect
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.base.arrays import FloatArray, Int32Array
+    from odscen.base.categories import Body
     from odscen.lanegraph.graphs import MapGraph
     from odscen.scenario.document.scenario_document import Environment, Scenario
     from odscen.sumo.realize.driving import Driver
@@ -26,11 +28,8 @@ UNKNOWN_LIMIT = 13.89
 """Speed (m/s) that free-flow times assume where the map gives no limit: 50 km/h."""
 
 
-class ModelSizes(Protocol):
+class ModelSizes(ModelBodies, Protocol):
     """What realization asks of the asset catalogue."""
-
-    def dimensions(self, model: str) -> Body | None:
-        """Size of a model, ``None`` if there is no such model."""
 
     def electric(self, model: str) -> bool:
         """Whether a model has no exhaust; false if there is no such model."""
@@ -123,11 +122,10 @@ class FreeFlow:
     step_length: float
 
     def body(self, user: RoadUser) -> Body:
-        """Body of its model, or the usual one of its category."""
-        known = None
-        if user.design.model is not None and self.assets is not None:
-            known = self.assets.dimensions(user.design.model)
-        return DEFAULT_BODY[user.category] if known is None else known
+        """Body of its own, of its model, or the usual one of its category."""
+        if user.design.size is None and user.design.model is None:  # nearly all: a flow's have none
+            return DEFAULT_BODY[user.category]
+        return body_of(user.design, self.assets)
 
     def driver(self, user: RoadUser, body: Body) -> Driver:
         """How it drives, or walks."""

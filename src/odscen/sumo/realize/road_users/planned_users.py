@@ -139,7 +139,13 @@ class RoadUserWriter:
             self._refuse_missed(user, walk.edges)
             return walk
         vclass = KINDS[user.category].vclass
-        route = self._routes.plan(path, length=body.length, vclass=vclass, lateral_offset=offset)
+        route = self._routes.plan(
+            path,
+            length=body.length,
+            vclass=vclass,
+            lateral_offset=offset,
+            longitudinal_offset=user.design.longitudinal_offset,
+        )
         self._refuse_missed(user, route.edges)
         route = self.actions.fitted(
             route, self._net, length=body.length, depart=user.depart, vclass=vclass
@@ -261,6 +267,7 @@ def planned_actor(
     name = walk_node_id if user.person else node_id
     spawn = user.spawn
     hdg = float(nodes.hdg[spawn])
+    left, ahead = user.design.lateral_offset, user.design.longitudinal_offset
     return PlannedActor(
         id=user.id,
         category=user.category.value,
@@ -269,8 +276,8 @@ def planned_actor(
         depart=user.depart if appears_at is None else appears_at,
         length=body.length,
         width=body.width,
-        x=float(nodes.x[spawn]) - math.sin(hdg) * user.design.lateral_offset,
-        y=float(nodes.y[spawn]) + math.cos(hdg) * user.design.lateral_offset,
+        x=float(nodes.x[spawn]) - math.sin(hdg) * left + math.cos(hdg) * ahead,
+        y=float(nodes.y[spawn]) + math.cos(hdg) * left + math.sin(hdg) * ahead,
         z=float(nodes.z[spawn]),
         hdg=hdg,
         speed=user.speed,

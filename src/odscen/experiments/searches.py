@@ -18,6 +18,7 @@ import numpy as np
 from odscen.base.checksums import seal_files, unseal_files
 from odscen.base.errors import InputError
 from odscen.base.folder_locks import locked
+from odscen.base.given_files import as_path
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.experiments.closeness import criticality
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.base.arrays import FloatArray
+    from odscen.base.given_files import GivenPath
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.sweeps.sweep_plan import Range, Table
@@ -124,6 +126,8 @@ class SearchSettings:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        if not proposal_kind(self.method).counted:
+            raise InputError(f"method {self.method} takes no number of runs; sweep has it")
         for name, most in (("runs", MOST_CASES), ("batch", MOST_CASES)):
             value = getattr(self, name)
             if not 1 <= value <= most:
@@ -147,7 +151,7 @@ class SearchResult:
         Those of them that differ, the most critical of any that are alike.
     coverage
         Share of pairs of values that were tried,
-        see :func:`odscen.experiments.search.pair_coverage`.
+        see :func:`odscen.experiments.searches.pair_coverage`.
     """
 
     folder: Path
@@ -161,7 +165,7 @@ def search(
     workspace: Workspace,
     scenario: Scenario,
     axes: Sequence[Range | Table],
-    out: Path,
+    out: GivenPath,
     *,
     search_settings: SearchSettings,
     settings: SweepSettings | None = None,
@@ -197,7 +201,7 @@ def search(
     MissingDependencyError
         If the method needs a package that is not installed.
     """
-    settings = settings or SweepSettings()
+    settings, out = settings or SweepSettings(), as_path(out)
     cases = CaseRuns(scenario, out, settings, table=SEARCH)
     plan = SweepPlan(
         tuple(axes), search_settings.method, search_settings.runs, search_settings.seed

@@ -1,0 +1,94 @@
+import { Button, Group, SegmentedControl, Select, Text } from "@mantine/core";
+import { plural, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+
+import type { Edit, ScenarioDocument } from "../api/types";
+import { localized } from "../language/localized";
+
+const CONTROLS = localized(() => [
+  { value: "fixed", label: t`Fixed-time` },
+  { value: "actuated", label: t`Actuated` },
+]);
+/** So many junctions are buttons; more are a list that can be searched. */
+const FEW = 12;
+
+/** Of the step, in a line. */
+export const lightsNote = (junctions: readonly string[]): string =>
+  junctions.length === 0
+    ? t`None on this map`
+    : plural(junctions.length, { one: "# junction", other: "# junctions" });
+
+/** The traffic lights of the map: how all are controlled, and the program of each junction. */
+export function LightsStep({
+  junctions,
+  shown,
+  control,
+  onEdit,
+  onShow,
+}: {
+  junctions: readonly string[];
+  /** The junction whose program is open. */
+  shown: string | null;
+  control: ScenarioDocument["signals"]["control"];
+  onEdit: (edit: Edit) => void;
+  onShow: (junction: string) => void;
+}) {
+  if (junctions.length === 0)
+    return (
+      <Text size="sm">
+        <Trans>This map has no traffic lights.</Trans>
+      </Text>
+    );
+  return (
+    <>
+      <Text size="sm">
+        <Trans>Click a junction on the map to see its signal program and change it.</Trans>
+      </Text>
+      {junctions.length > FEW ? (
+        <Select
+          label={t`Junction`}
+          placeholder={t`Choose a junction`}
+          data={[...junctions]}
+          value={shown}
+          searchable
+          onChange={(junction) => {
+            if (junction) onShow(junction);
+          }}
+        />
+      ) : (
+        <Group gap={6} role="group" aria-label={t`Junctions with a traffic light`}>
+          {junctions.map((junction) => (
+            <Button
+              key={junction}
+              size="compact-sm"
+              variant={junction === shown ? "filled" : "default"}
+              aria-pressed={junction === shown}
+              onClick={() => onShow(junction)}
+            >
+              <Trans>Junction {junction}</Trans>
+            </Button>
+          ))}
+        </Group>
+      )}
+      <div>
+        <Text size="sm" fw={500}>
+          <Trans>Signal control</Trans>
+        </Text>
+        <SegmentedControl
+          fullWidth
+          data={CONTROLS()}
+          value={control}
+          aria-label={t`Signal control`}
+          onChange={(value) =>
+            onEdit({ kind: "set_signal_control", control: value === "actuated" ? value : "fixed" })
+          }
+        />
+        <Text size="xs" c="dimmed" mt={4}>
+          {control === "fixed"
+            ? t`Every signal keeps its times.`
+            : t`A green is extended while vehicles arrive.`}
+        </Text>
+      </div>
+    </>
+  );
+}
