@@ -39,6 +39,7 @@ _GROUPS: dict[str, tuple[str, dict[str, str]]] = {
     "signals": ("signal_commands:app", {}),
     "transit": ("transit_commands:app", {}),
     "trash": ("removal_commands:trash", {}),
+    "recording": ("recording_commands:app", {}),
     "learn": ("learn_command:app", {}),
     "study": ("study_commands:app", {}),
 }
@@ -62,6 +63,7 @@ _COMMANDS = {
     "diff": "difference_commands:diff_scenarios",
     "cosim": "cosim_commands:cosim",
     "serve": "serve_command:serve",
+    "assist": "assist_command:assist",
     "remove": "removal_commands:remove",
     "doctor": "doctor_command:doctor",
     "demo": "demo_command:demo",
