@@ -25,6 +25,7 @@ const CatalogueView = lazy(async () => ({
 }));
 const EditorView = lazy(async () => ({ default: (await import("./editor/EditorView")).EditorView }));
 const ImportView = lazy(async () => ({ default: (await import("./exchange/ImportView")).ImportView }));
+const MendView = lazy(async () => ({ default: (await import("./mending/MendView")).MendView }));
 const RunView = lazy(async () => ({ default: (await import("./run/RunView")).RunView }));
 const SweepsView = lazy(async () => ({ default: (await import("./experiments/SweepsView")).SweepsView }));
 const SweepView = lazy(async () => ({ default: (await import("./experiments/SweepView")).SweepView }));
@@ -85,6 +86,12 @@ export function App() {
               <span aria-current="page">
                 <Trans>Import</Trans>
               </span>
+            </>
+          )}
+          {address.view === "mend" && (
+            <>
+              <span aria-hidden="true">›</span>
+              <span aria-current="page">{address.map}</span>
             </>
           )}
           {address.view === "run" && (
@@ -162,6 +169,7 @@ export function App() {
           {address.view === "catalogue" && <CatalogueView />}
           {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}
           {address.view === "imported" && <ImportView key={address.scenario} scenario={address.scenario} />}
+          {address.view === "mend" && <MendView key={address.map} map={address.map} />}
           {address.view === "run" && (
             <RunView key={address.run} scenario={address.scenario} run={address.run} />
           )}

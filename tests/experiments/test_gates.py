@@ -1,12 +1,21 @@
 import json
 import re
 import shutil
+from pathlib import Path
 
 import pytest
 from lxml import etree
 
 from odscen.base.errors import InputError
-from odscen.experiments.gates import Update, run_suite
+from odscen.experiments.annotations import code_quality, github_annotations
+from odscen.experiments.baseline import fingerprint
+from odscen.experiments.gates import (
+    Update,
+    _with_fields,
+    keep_scenario,
+    run_suite,
+    scenario_changes_since,
+)
 from odscen.experiments.plan import StudyPlan, found_sources
 from odscen.experiments.suite import read_suite
 from odscen.experiments.suite_page import suite_page
@@ -19,7 +28,10 @@ from odscen.experiments.suite_words import (
     suite_summary,
     to_dict,
 )
+from odscen.experiments.verdict import causes_between
 from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
+from odscen.scenario.document.json_form import dumps, loads
 from tests.experiments.conftest import ROOT, copy_suite, edit_json, write_tiny
 
 
@@ -113,9 +125,9 @@ def test_a_tolerance_of_the_suite_lets_it_pass(store, suite):
     suite.write_text(suite.read_text() + "\n[tolerance]\n" + "\n".join(rows))
     result = run(store, suite)
     assert result.exit_code == 0
-    assert lines(case(result, "signal_crossing")) == [
-        "changed since the baseline: the scenario's signals"
-    ]
+    (line,) = lines(case(result, "signal_crossing"))
+    words = "changed since the baseline: the scenario's signals (signals, junction 10001: added ("
+    assert line.startswith(words)
 
 
 @pytest.mark.slow
@@ -340,6 +352,86 @@ def test_a_changed_map_fails_where_the_suite_says_so(store, tiny):
     result = run(store, suite)
     assert (statuses(result), result.exit_code) == ({"one": "failed"}, 1)
     assert headline(result.cases[0]) == f"the map: this suite allows no change of map; {NOWHERE}"
+
+
+@pytest.mark.slow
+def test_a_narrower_lane_fails_by_default_and_passes_where_the_suite_says_so(store, tiny):
+    """A width acts on no traffic in SUMO; the gate names lane, place and both values."""
+    suite = tiny("one")
+    run(store, suite, update=Update(True))
+    path = suite.parent / "maps" / "t_junction_signs.xodr"
+    text = path.read_text()
+    pattern = r'(<lane id="-1" type="driving".*?<width [^>]*?\ba=")[\d.]+'
+    narrower = re.sub(pattern, r"\g<1>2.4", text, count=1, flags=re.DOTALL)
+    assert narrower != text
+    path.write_text(narrower)
+    result = run(store, suite)
+    assert result.exit_code == 1
+    words = (
+        r"the map: width of lane -1 of road \d+, s 0 to \d+ m: \S+ m -> 2\.4 m: this suite allows"
+    )
+    assert re.match(words, headline(result.cases[0])), headline(result.cases[0])
+    annotation = github_annotations(result)
+    file, line = re.match(
+        r"::error file=([^,]+),line=(\d+),title=one%3A failed::", annotation
+    ).groups()
+    road = re.search(r"of road (\d+)", headline(result.cases[0]))[1]
+    assert f'id="{road}"' in Path(file).read_text().splitlines()[int(line) - 1]
+    (entry,) = json.loads(code_quality(result))
+    assert entry["severity"] == "major"
+    assert entry["location"] == {"path": file, "lines": {"begin": int(line)}}
+    suite.write_text('map = "report"\n' + suite.read_text())
+    (reported,) = run(store, suite).cases
+    assert reported.causes[0].name == "map"
+    assert not any("allows no change" in words for words in reported.problems)
+
+
+FIELDS = {
+    "style": (("actors", 0, "style"), "sporty", r"actors: actor \S+, style: \S+ -> \"sporty\""),
+    "desired speed": (("actors", 0, "speed"), 9.5, r"actors: actor \S+, speed: \S+ -> 9\.5"),
+    "step of a rule": (
+        ("rules", 0, "then", 0, "speed", "to"), 3.0,
+        r"rules: rule slow, then 1, speed, to: 6\.0 -> 3\.0",
+    ),
+    "trigger of a rule": (
+        ("rules", 0, "when", "time", "after"), 9.0,
+        r"rules: rule slow, when, time, after: 2\.0 -> 9\.0",
+    ),
+    "step length": (
+        ("simulation", "step_length"), 0.4, r"settings: simulation, step length: 0\.5 -> 0\.4",
+    ),
+}  # fmt: skip
+
+
+def test_the_field_of_a_scenario_that_has_changed_is_named_with_both_values(tmp_path):
+    """Style, speed, step and trigger of a rule, settings: from what is kept beside the baseline."""
+    write_tiny(tmp_path / "suite", "one")
+    document = json.loads((tmp_path / "suite" / "one.scenario.json").read_text())
+    actor = document["actors"][0]
+    actor["style"] = "normal"
+    step = {"speed": {"to": 6.0, "over": 2.0}}
+    document["rules"] = [
+        {"id": "slow", "actor": actor["id"], "when": {"time": {"after": 2.0}}, "then": [step]}
+    ]
+    before = loads(json.dumps(document))
+    settings = RunSettings()
+    made_of = fingerprint(before, "0" * 64, settings)
+    keep_scenario(tmp_path, "one", before, made_of)
+    for place, value, words in FIELDS.values():
+        changed = json.loads(dumps(before))
+        *path, last = place
+        at = changed
+        for key in path:
+            at = at.setdefault(key, {}) if isinstance(at, dict) else at[key]
+        at[last] = value
+        after = loads(json.dumps(changed))
+        fields = scenario_changes_since(tmp_path, "one", made_of, after)
+        causes = causes_between(made_of, fingerprint(after, "0" * 64, settings))
+        (cause,) = (_with_fields(cause, fields) for cause in causes)
+        assert re.match(words, f"{cause.name}: {cause.details}"), cause
+    assert scenario_changes_since(tmp_path, "one", made_of, before) == ()
+    other = made_of | {"scenario.actors": "0" * 16}
+    assert scenario_changes_since(tmp_path, "one", other, after) == ()  # of another baseline
 
 
 @pytest.mark.slow

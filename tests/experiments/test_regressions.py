@@ -123,7 +123,10 @@ def test_a_longer_stage_of_a_signal_is_caught_at_its_junction(store, suite):
     timing = {"junction": "10001", "green": [60, 8]}
     edit_scenarios(suite, lambda document: document.update(signals={"junctions": [timing]}))
     (found,) = first_lines(store, suite).values()
-    words = r"signals: .*mean_delay is .*most at junction j10001: waiting_time is"
+    words = (
+        r"signals: signals, junction 10001: added \(.*60.*\): .* is "
+        r".*most at junction j10001: waiting_time is"
+    )
     assert (found[0], bool(re.match(words, found[1]))) == ("failure", True), found[1]
 
 
@@ -162,7 +165,7 @@ def test_a_change_of_traffic_is_caught_by_every_scenario_with_its_cause_and_plac
     somewhere = 0
     for outcome, words in found.values():
         assert outcome == "failure"
-        assert re.match(rf"{cause}: .*({place}|{NOWHERE}$)", words), words
+        assert re.match(rf"{cause}: .* -> .*({place}|{NOWHERE}$)", words), words
         somewhere += bool(re.search(place, words))
     # A setting acts everywhere alike: in one scenario no place may stand out.
     assert somewhere > len(NAMES) / 2 - (cause == "settings")

@@ -1,7 +1,11 @@
 import { t } from "@lingui/core/macro";
 
 import { address, api, ApiError, call } from "./client";
+import type { components } from "./schema";
 import type { ConversionReport, Job } from "./types";
+
+export type MapEdit = components["schemas"]["MapEdits"]["edits"][number];
+export type PlaceInfo = components["schemas"]["PlaceInfo"];
 
 const PAUSE = 300;
 
@@ -9,6 +13,18 @@ export const reportUrl = (name: string): string =>
   address("/api/maps/{name}/report", { params: { path: { name } } });
 export const conversionReport = (name: string): Promise<ConversionReport> =>
   call("get", "/api/maps/{name}/report", { params: { path: { name } } });
+
+/** Edits that mend a map, and what became of each. */
+export const mapEdits = (name: string) =>
+  call("get", "/api/maps/{name}/edits", { params: { path: { name } } });
+
+/** Mends a map by edits, in place of those that it has; the server's job. `out` gets them. */
+export const mendMap = (name: string, edits: MapEdit[], out: string) =>
+  call("post", "/api/maps/{name}/edits", { params: { path: { name } }, body: { edits, out } });
+
+/** What is at a place of a map, metres. */
+export const placeAt = (name: string, x: number, y: number): Promise<PlaceInfo> =>
+  call("get", "/api/maps/{name}/place", { params: { path: { name }, query: { x, y } } });
 
 /** Formats that maps can have. */
 export const mapImporters = () => call("get", "/api/map-importers");

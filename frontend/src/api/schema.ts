@@ -2543,6 +2543,21 @@ export interface components {
             /** @default 5 */
             length: number;
         };
+        /** @description Give the lane, its direction or all lanes of the section there a limit, km/h. */
+        LaneLimit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            limit: number;
+            /**
+             * @default direction
+             * @enum {string}
+             */
+            lanes?: "lane" | "direction" | "road";
+        };
         /** @description Give a lane a width, metres, but for a taper at both ends of its section. */
         LaneWidth: {
             at: components["schemas"]["MapPlace"];
@@ -2647,12 +2662,12 @@ export interface components {
         };
         /** @description All edits of a map, in place of those that it has; ``out`` is the map that gets them. */
         MapEdits: {
-            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["odscen__maps__map_edits__SpeedLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
+            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
             out?: string | null;
         };
         /** @description Edits of a map in their order, and what became of each; the row of edit n has number n. */
         MapEditsInfo: {
-            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["odscen__maps__map_edits__SpeedLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
+            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
             rows: components["schemas"]["ConversionEntry"][];
         };
         /** @description The map's version of OpenDRIVE, and on which side is driven: RHT, LHT or mixed. */
@@ -3092,9 +3107,10 @@ export interface components {
             words: string;
         };
         /**
-         * @description What is at a place of a map: its lane, with outline, and what is near it.
+         * @description What is at a place of a map: its lane, and what is near it.
          *
-         *     Width in metres, limit in km/h, direction of driving in rad.
+         *     Width in metres, limit in km/h, direction of driving in rad; ``ring`` is the outline of the
+         *     lane, x and y in turn.
          */
         PlaceInfo: {
             road: string;
@@ -3102,10 +3118,7 @@ export interface components {
             width: number;
             limit: number | null;
             hdg: number;
-            ring: [
-                number,
-                number
-            ][];
+            ring: number[];
             parts: ("stop_line" | "crosswalk" | "light" | "sign")[];
         };
         /**
@@ -3907,7 +3920,7 @@ export interface components {
              */
             signals: components["schemas"]["Signals"];
             /** @default [] */
-            measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["odscen__scenario__document__measures_document__SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
+            measures: (components["schemas"]["RoadClosure-Output"] | components["schemas"]["Roadworks-Output"] | components["schemas"]["LaneIncident-Output"] | components["schemas"]["SpeedLimit-Output"] | components["schemas"]["ChangedPermission-Output"] | components["schemas"]["SignalOutage-Output"])[];
             /**
              * @default {
              *       "duration": 600,
@@ -4327,7 +4340,7 @@ export interface components {
              * @enum {string}
              */
             kind: "set_measure";
-            measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["odscen__scenario__document__measures_document__SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
+            measure: components["schemas"]["RoadClosure-Input"] | components["schemas"]["Roadworks-Input"] | components["schemas"]["LaneIncident-Input"] | components["schemas"]["SpeedLimit-Input"] | components["schemas"]["ChangedPermission-Input"] | components["schemas"]["SignalOutage-Input"];
             instead_of?: string | null;
         };
         /** @description Let the program of a light begin so many seconds into the scenario. */
@@ -4832,6 +4845,34 @@ export interface components {
             rate: number | null;
             over: number | null;
             within: number | null;
+        };
+        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
+        "SpeedLimit-Input": {
+            id: string;
+            /** @default 0 */
+            begin?: number;
+            end?: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            places: string[];
+            speed: number;
+        };
+        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
+        "SpeedLimit-Output": {
+            id: string;
+            /** @default 0 */
+            begin: number;
+            end: number | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "speed_limit";
+            places: string[];
+            speed: number;
         };
         /**
          * @description A stage in the cycle of a plan; seconds.
@@ -5530,49 +5571,6 @@ export interface components {
         Zone: {
             id: string;
             segments: string[];
-        };
-        /** @description Give the lane, its direction or all lanes of the section there a limit, km/h. */
-        odscen__maps__map_edits__SpeedLimit: {
-            at: components["schemas"]["MapPlace"];
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            limit: number;
-            /**
-             * @default direction
-             * @enum {string}
-             */
-            lanes?: "lane" | "direction" | "road";
-        };
-        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
-        "odscen__scenario__document__measures_document__SpeedLimit-Input": {
-            id: string;
-            /** @default 0 */
-            begin?: number;
-            end?: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            places: string[];
-            speed: number;
-        };
-        /** @description Another speed limit, m/s; of several at a place the lowest holds. */
-        "odscen__scenario__document__measures_document__SpeedLimit-Output": {
-            id: string;
-            /** @default 0 */
-            begin: number;
-            end: number | null;
-            /**
-             * @description discriminator enum property added by openapi-typescript
-             * @enum {string}
-             */
-            kind: "speed_limit";
-            places: string[];
-            speed: number;
         };
         /** @description A road user that will ever be in a frame, and the row by which frames name them; metres. */
         LiveActor: {

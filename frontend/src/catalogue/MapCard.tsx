@@ -3,6 +3,7 @@ import { ActionIcon, Button, Card, Group, Text, Title, Tooltip } from "@mantine/
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import type { MapInfo } from "../api/types";
+import { hashOf } from "../ui/address";
 import { IconTrash } from "../ui/icons";
 import { mapFacts, networkFact } from "../ui/words";
 import { lossWords } from "./losses";
@@ -69,6 +70,16 @@ export function MapCard({
           aria-label={t`Import report of ${map.name}`}
         >
           <Trans>Import report</Trans>
+        </Button>
+        <Button
+          fullWidth
+          variant="subtle"
+          size="compact-sm"
+          component="a"
+          href={hashOf({ view: "mend", map: map.name })}
+          aria-label={t`Mend ${map.name}`}
+        >
+          <Trans>Mend the map</Trans>
         </Button>
       </div>
     </Card>

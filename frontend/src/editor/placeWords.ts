@@ -43,8 +43,11 @@ export function laneFacts(graph: Graph, id: string): string {
   const kind = nth(columns.lane_types, nth(columns.lane, place.index));
   const width = lengthText(nth(columns.width, place.index), 1);
   const limit = nth(columns.speed_limit, place.index);
-  return t`${KIND()[kind] ?? t`Lane`}, ${width} wide, ${limit === null ? t`no limit` : t`limit ${speedText(limit)}`}`;
+  return t`${laneKind(kind)}, ${width} wide, ${limit === null ? t`no limit` : t`limit ${speedText(limit)}`}`;
 }
+
+/** The kind of a lane in words. */
+export const laneKind = (type: string): string => KIND()[type] ?? t`Lane`;
 
 const KIND = localized((): Record<string, string> => ({
   driving: t`Driving lane`,
@@ -57,4 +60,7 @@ const KIND = localized((): Record<string, string> => ({
   bus: t`Bus lane`,
   taxi: t`Taxi lane`,
   HOV: t`Carpool lane`,
+  sidewalk: t`Sidewalk`,
+  walking: t`Sidewalk`,
+  parking: t`Parking lane`,
 }));

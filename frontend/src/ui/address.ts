@@ -11,6 +11,7 @@ export type Address =
   | { view: "runs"; scenario: string }
   | { view: "sweeps"; scenario: string }
   | { view: "sweep"; scenario: string; sweep: string }
+  | { view: "mend"; map: string }
   | { view: "studies" }
   | { view: "study"; study: string };
 
@@ -22,6 +23,7 @@ export function parseAddress(hash: string): Address {
   if (view === "runs" && scenario) return { view: "runs", scenario };
   if (view === "sweeps" && scenario) return { view: "sweeps", scenario };
   if (view === "sweep" && scenario && run) return { view: "sweep", scenario, sweep: run };
+  if (view === "mend" && scenario) return { view, map: scenario };
   if (view === "studies") return { view };
   if (view === "study" && scenario) return { view, study: scenario };
   return { view: "catalogue" };
@@ -36,6 +38,7 @@ export function hashOf(address: Address): string {
   if (address.view === "runs") return `#/runs/${enc(address.scenario)}`;
   if (address.view === "sweeps") return `#/sweeps/${enc(address.scenario)}`;
   if (address.view === "sweep") return `#/sweep/${enc(address.scenario)}/${enc(address.sweep)}`;
+  if (address.view === "mend") return `#/mend/${enc(address.map)}`;
   if (address.view === "studies") return "#/studies";
   if (address.view === "study") return `#/study/${enc(address.study)}`;
   return "#/";

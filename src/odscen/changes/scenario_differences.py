@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
 _LONGEST = 80
+_NAMES = ("id", "junction")
+"""Fields by which entries of lists are paired."""
+_NTH = "#"
+"""Before the number of an entry of a list, from 1 on, in the place of a change."""
 _SINGULAR = {
     "actors": "actor",
     "flows": "flow",
@@ -32,6 +36,7 @@ _SINGULAR = {
     "detectors": "detector",
     "sections": "travel-time section",
     "cordons": "cordon",
+    "junctions": "junction",
 }
 
 
@@ -40,7 +45,7 @@ class ScenarioChange:
     """A difference of two documents; ``before`` and ``after`` as JSON, ``None`` where nothing is.
 
     ``place`` is the path of the field, with the ids of actors, flows and the like:
-    ``("actors", "van-1", "goal")``.
+    ``("actors", "van-1", "goal")``; entries without an id by their number, ``"#1"``.
     """
 
     kind: ChangeKind
@@ -52,13 +57,18 @@ class ScenarioChange:
     def words(self) -> str:
         """One line for people: ``actor van-1, goal: "5.0.-1.3" -> "7.0.-1.9"``."""
         if self.before is None or self.after is None:
-            return f"{self._describe_subject()}: {self.kind}"
+            value = self.after or self.before
+            told = f" ({value})" if value else ""
+            return f"{self._describe_subject()}: {self.kind}{told}"
         return f"{self._describe_subject()}: {self.before} -> {self.after}"
 
     def _describe_subject(self) -> str:
         said: list[str] = []
         parts = iter(self.place)
         for part in parts:
+            if part.startswith(_NTH):
+                said[-1] += f" {part.removeprefix(_NTH)}"
+                continue
             key = next(parts, None) if part in _SINGULAR else None
             name = part.replace("_", " ")
             said.append(name if key is None else f"{_SINGULAR[part]} {shown_id(key)}")
@@ -79,7 +89,7 @@ def scenario_differences(before: Scenario, after: Scenario) -> tuple[ScenarioCha
     """Find the differences of two scenarios, in the order of the fields of the document.
 
     Actors, flows and whatever else has an id are paired by it, so their order is told apart from
-    their content.
+    their content. Others are paired by their place where there are as many as before.
     """
     old, new = (scenario.model_dump(mode="json") for scenario in (before, after))
     return tuple(field_differences(old, new))
@@ -103,29 +113,44 @@ def _compare_values(old: Any, new: Any, place: tuple[str, ...]) -> Iterator[Scen
     if isinstance(old, dict) and isinstance(new, dict):
         yield from _compare_fields(old, new, place)
     elif isinstance(old, list) and isinstance(new, list):
-        if all(isinstance(item, dict) and "id" in item for item in (*old, *new)):
-            yield from _by_id(old, new, place)
+        entries = (*old, *new)
+        name = next(
+            (key for key in _NAMES if all(isinstance(row, dict) and key in row for row in entries)),
+            None,
+        )
+        if name is not None:
+            yield from _by_name(old, new, place, name)
+        elif len(old) == len(new) and all(isinstance(row, dict) for row in entries):
+            for number, (before, after) in enumerate(zip(old, new, strict=True), start=1):
+                yield from _compare_values(before, after, (*place, f"{_NTH}{number}"))
         else:
             yield ScenarioChange("changed", place, *_shorten_lists(old, new))
     else:
         yield ScenarioChange("changed", place, _format_value(old), _format_value(new))
 
 
-def _by_id(
-    old: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]], place: tuple[str, ...]
+def _by_name(
+    old: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]], place: tuple[str, ...], name: str
 ) -> Iterator[ScenarioChange]:
-    was = {part["id"]: part for part in old}
-    now = {part["id"]: part for part in new}
+    was = {part[name]: part for part in old}
+    now = {part[name]: part for part in new}
     for key, one in was.items():
         if key in now:
             yield from _compare_fields(one, now[key], (*place, key))
         else:
-            yield ScenarioChange("removed", (*place, key))
-    for key in now:
+            yield ScenarioChange("removed", (*place, key), _describe_timing(one, name))
+    for key, one in now.items():
         if key not in was:
-            yield ScenarioChange("added", (*place, key))
+            yield ScenarioChange("added", (*place, key), None, _describe_timing(one, name))
     if [key for key in was if key in now] != [key for key in now if key in was]:
         yield ScenarioChange("changed", (*place, "order"), "as it was", "another")
+
+
+def _describe_timing(part: Mapping[str, Any], name: str) -> str | None:
+    """What is given of a light, which has its map's program otherwise."""
+    if name != "junction":
+        return None
+    return _format_value({key: value for key, value in part.items() if value and key != name})
 
 
 def _shorten_lists(old: Sequence[Any], new: Sequence[Any]) -> tuple[str, str]:

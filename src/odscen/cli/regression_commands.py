@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,13 @@ if TYPE_CHECKING:
 HtmlOption = Annotated[
     Path | None, typer.Option("--html", help="Write a page for people.", dir_okay=False)
 ]
+
+
+class Annotations(StrEnum):
+    """Where findings are shown."""
+
+    GITHUB = "github"
+    GITLAB = "gitlab"
 
 
 def _parse_shard(text: str) -> tuple[int, int]:
@@ -87,6 +95,13 @@ def gate(
         Path | None,
         typer.Option(help="Write the figures of all runs, for --merge.", dir_okay=False),
     ] = None,
+    annotations: Annotated[
+        Annotations | None,
+        typer.Option(
+            help="Show findings at the files of a change: github prints workflow commands, gitlab "
+            "writes gl-code-quality-report.json.",
+        ),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -122,6 +137,8 @@ def gate(
     if as_json:
         print_json(to_dict(result))
     _show_result(result, as_json=as_json)
+    if annotations is not None:
+        _annotate(result, annotations, as_json=as_json)
     raise typer.Exit(result.exit_code)
 
 
@@ -165,6 +182,21 @@ def _show_result(result: SuiteResult, *, as_json: bool) -> None:
     for case in result.worst_first:
         for line in lines(case):
             log(f"{case.name}: {line}")
+
+
+def _annotate(result: SuiteResult, form: Annotations, *, as_json: bool) -> None:
+    from odscen.base.text_files import write_text
+    from odscen.experiments.annotations import (
+        CODE_QUALITY_FILE,
+        code_quality,
+        github_annotations,
+    )
+
+    if form is Annotations.GITLAB:
+        write_text(Path(CODE_QUALITY_FILE), code_quality(result))
+        return
+    # GitHub reads both; with --json stdout is one object.
+    typer.echo(github_annotations(result), nl=False, err=as_json)
 
 
 def compare(

@@ -11,6 +11,7 @@ counts. More seeds are run as long as those that are there ask for more.
 from __future__ import annotations
 
 import gzip
+import json
 import shutil
 import zlib
 from dataclasses import replace
@@ -19,9 +20,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, OdscenError
-from odscen.base.given_files import as_path
+from odscen.base.given_files import MOST, as_path
 from odscen.base.text_files import write_file
 from odscen.changes.map_differences import map_differences
+from odscen.changes.scenario_differences import scenario_differences
 from odscen.experiments.baseline import (
     baseline_of,
     map_digest,
@@ -42,6 +44,7 @@ from odscen.experiments.verdict import (
 from odscen.experiments.work import LocalExecutor
 from odscen.opendrive.parse import parse
 from odscen.opendrive.parse_rules import MAX_BYTES
+from odscen.scenario.document.json_form import dumps, loads
 from odscen.sumo.realize.driving import normal_headway
 
 if TYPE_CHECKING:
@@ -50,8 +53,9 @@ if TYPE_CHECKING:
 
     from odscen.app.running.runs import CheckedRun
     from odscen.base.given_files import GivenPath
-    from odscen.changes.map_change import MapChange
-    from odscen.experiments.baseline import Baseline
+    from odscen.changes.map_change import ChangedThing, MapChange
+    from odscen.changes.scenario_differences import ScenarioChange
+    from odscen.experiments.baseline import Baseline, Fingerprint
     from odscen.experiments.measure import Measured
     from odscen.experiments.suite import Case, Suite
     from odscen.experiments.suite_runs import RunCase, UnusableCase
@@ -204,6 +208,11 @@ def with_other_steps(run: CheckedRun) -> RunSettings:
     return replace(run.settings, step_length=2 * step if 2 * step <= _LONGEST_STEP else step / 2)
 
 
+LANE_CHANGES: frozenset[ChangedThing] = frozenset(
+    {"road", "lane", "lane type", "lane direction", "width", "limit", "permission", "connection"}
+)
+"""What of a map says where vehicles may drive and how fast: fails unless a suite says otherwise."""
+
 FOLDER = "maps"
 _NAMED = 2
 
@@ -213,6 +222,52 @@ def keep_map(baselines: Path, entry: MapEntry, digest: str) -> None:
     file = _kept_map_file(baselines, digest)
     if not file.is_file():
         write_file(file, gzip.compress(entry.read("xodr"), mtime=0))
+
+
+def keep_scenario(baselines: Path, name: str, scenario: Scenario, made_of: Fingerprint) -> None:
+    """Keep the scenario of a baseline, compressed, to say later which fields have changed."""
+    kept = {"made_of": _scenario_parts(made_of), "scenario": json.loads(dumps(scenario))}
+    text = json.dumps(kept, sort_keys=True, separators=(",", ":"))
+    write_file(_kept_scenario_file(baselines, name), gzip.compress(text.encode(), mtime=0))
+
+
+def scenario_changes_since(
+    baselines: Path, name: str, made_of: Fingerprint, scenario: Scenario
+) -> tuple[ScenarioChange, ...]:
+    """Fields that differ from the scenario of a baseline; none where that one is not kept.
+
+    Parameters
+    ----------
+    baselines
+        Folder of the baseline.
+    made_of
+        Fingerprint of the baseline.
+    scenario
+        The one of now.
+    """
+    try:
+        with gzip.open(_kept_scenario_file(baselines, name)) as stream:
+            kept = json.loads(stream.read(MOST))
+        if kept["made_of"] != _scenario_parts(made_of):
+            return ()
+        return scenario_differences(loads(json.dumps(kept["scenario"])), scenario)
+    except (OSError, EOFError, zlib.error, ValueError, KeyError, TypeError, OdscenError):
+        return ()
+
+
+def _kept_scenario_file(baselines: Path, name: str) -> Path:
+    return baselines / "scenarios" / f"{name}.json.gz"
+
+
+def _scenario_parts(made_of: Fingerprint) -> Fingerprint:
+    return {name: digest for name, digest in made_of.items() if name.startswith("scenario.")}
+
+
+def _as_run(run: CheckedRun) -> Scenario:
+    """The scenario with what the suite says of its simulation."""
+    until, step_length = run.settings.times(run.scenario)
+    own = run.scenario.simulation.model_copy(update={"duration": until, "step_length": step_length})
+    return run.scenario.model_copy(update={"simulation": own})
 
 
 def changes_since(baselines: Path, digest: str, entry: MapEntry) -> tuple[MapChange, ...] | None:
@@ -237,7 +292,8 @@ def change_words(changes: tuple[MapChange, ...]) -> str:
     """The first differences in words, and how many more there are."""
     if not changes:
         return "the map is written otherwise, but means the same"
-    said = "; ".join(change.words for change in changes[:_NAMED])
+    first = sorted(changes, key=lambda change: change.what not in LANE_CHANGES)
+    said = "; ".join(change.words for change in first[:_NAMED])
     more = len(changes) - _NAMED
     return f"the map: {said}" + (f"; and {more} more" if more > 0 else "")
 
@@ -364,7 +420,7 @@ def _unusable_result(case: UnusableCase) -> CaseResult:
     if changes is None:
         return replace(result, causes=(cause,))
     notes = tuple(change.words for change in changes[:_MAP_CHANGES])
-    return replace(result, causes=(_in_words(cause, changes),), notes=notes)
+    return replace(result, causes=(_in_words(cause, changes),), notes=notes, map_changes=changes)
 
 
 def _judge_case(loaded: LoadedCase, update: Update) -> CaseResult:
@@ -384,13 +440,14 @@ def _judge_case(loaded: LoadedCase, update: Update) -> CaseResult:
         errors=(*broken, *loaded.refused.values()),
         error_code=3 if broken else 2,
         failures=missed,
+        warnings=tuple(str(problem) for problem in loaded.run.warnings),
     )
     if case.baseline is None or result.errors:
         return result
     figures = {run.seed: run.figures for run in runs}
     result = replace(result, notes=seeds_that_hardly_vary(baseline_of(figures, {})))
     if update.wanted:
-        return _write_new_baseline(result, figures, force=update.force)
+        return _write_new_baseline(result, _as_run(loaded.run), figures, force=update.force)
     if loaded.baseline is None:
         new = f"there is no baseline {case.baseline}; write it with --update-baseline"
         return replace(result, new=(new,))
@@ -398,7 +455,7 @@ def _judge_case(loaded: LoadedCase, update: Update) -> CaseResult:
 
 
 def _write_new_baseline(
-    result: CaseResult, figures: Mapping[int, Measured], *, force: bool
+    result: CaseResult, scenario: Scenario, figures: Mapping[int, Measured], *, force: bool
 ) -> CaseResult:
     """Write the baseline, unless an expectation is missed."""
     file = result.case.baseline
@@ -412,6 +469,7 @@ def _write_new_baseline(
     write_baseline(baseline, file, scenario=result.name)
     if result.entry is not None:
         keep_map(file.parent, result.entry, result.made_of["map"])
+    keep_scenario(file.parent, result.name, scenario, result.made_of)
     return replace(result, updated=True, notes=(*result.notes, *seeds_for_small_changes(baseline)))
 
 
@@ -429,8 +487,14 @@ def _hold_case(
     changes = _map_changes(case, result.entry, baseline) if "map" in names else None
     if changes is not None:
         causes = tuple(_in_words(cause, changes) for cause in causes)
+    fields: tuple[ScenarioChange, ...] = ()
+    if case.baseline is not None and any(cause.part for cause in causes):
+        fields = scenario_changes_since(
+            case.baseline.parent, case.name, baseline.fingerprint, _as_run(loaded.run)
+        )
+        causes = tuple(_with_fields(cause, fields) for cause in causes)
     failures = [*result.failures, *(change.words for change in verdict.failing)]
-    failures += _forbidden_changes(case, names)
+    failures += _forbidden_changes(case, names, changes or ())
     # Scatter is known for seeds that the baseline does not have, but only on request.
     own = () if case.other_seeds and baseline.by_scatter else baseline.seeds
     return replace(
@@ -438,6 +502,8 @@ def _hold_case(
         causes=causes,
         verdict=verdict,
         failures=tuple(failures),
+        map_changes=changes or (),
+        scenario_changes=fields,
         missing=_describe_missing_seeds(
             own, figures, "the baseline has seed {}, which was not run"
         ),
@@ -453,10 +519,14 @@ def _hold_case(
     )
 
 
-def _forbidden_changes(case: Case, changed: Collection[str]) -> list[str]:
+def _forbidden_changes(
+    case: Case, changed: Collection[str], on_map: Sequence[MapChange]
+) -> list[str]:
     """Changed inputs that the suite does not allow, whatever becomes of the figures."""
     watched = set(changed) - set(VERSIONS) if case.inputs_fail else set()
-    watched |= {"map"} & set(changed) if case.map_fails else set()
+    watched |= {"map"} & set(changed) if case.map_rule == "fail" else set()
+    if case.map_rule == "lanes" and "map" not in watched:
+        watched |= {f"{change.what} on the map" for change in on_map if change.what in LANE_CHANGES}
     said = "this suite allows no change of"
     return [f"{said} {', '.join(sorted(watched))}"] if watched else []
 
@@ -473,6 +543,13 @@ def _map_changes(
 
 def _in_words(cause: Cause, changes: tuple[MapChange, ...]) -> Cause:
     return replace(cause, words=change_words(changes)) if cause.words == "the map" else cause
+
+
+def _with_fields(cause: Cause, changes: Sequence[ScenarioChange]) -> Cause:
+    """The cause with the fields that have changed in its part of the scenario."""
+    mine = [change.words for change in changes if cause.part and change.place[0] == cause.part]
+    more = f"; and {len(mine) - _NAMED} more" if len(mine) > _NAMED else ""
+    return replace(cause, details="; ".join(mine[:_NAMED]) + more)
 
 
 def _describe_missing_seeds(

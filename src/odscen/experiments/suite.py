@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.given_files import GivenPath
+    from odscen.changes.map_change import MapChange
+    from odscen.changes.scenario_differences import ScenarioChange
     from odscen.convert.model.conversion_settings import ConverterName
     from odscen.experiments.baseline import Baseline, Fingerprint
     from odscen.experiments.measure import Measured
@@ -92,6 +94,10 @@ def _detect_of_change(entry: object) -> object:
     return {"change": entry} if isinstance(entry, str) else entry
 
 
+MapRule = Literal["report", "lanes", "fail"]
+"""Which changes of a map fail: none, those of lanes, widths, limits and connections, or all."""
+
+
 class _Settings(Part):
     """What may stand at the top, for all scenarios, or at one of them."""
 
@@ -108,7 +114,7 @@ class _Settings(Part):
     step_length: Annotated[float, Field(gt=0, le=1)] | None = None
     time_limit: Annotated[float, Field(gt=0)] | None = None
     better: Literal["pass", "fail"] | None = None
-    map: Literal["report", "fail"] | None = None
+    map: MapRule | None = None
     inputs: Literal["report", "fail"] | None = None
 
     @model_validator(mode="after")
@@ -148,8 +154,8 @@ class Case:
         Its file, whether it is there or not; ``None`` if only expectations count.
     better_fails
         Whether a figure fails, too, that is better than its tolerance allows.
-    map_fails
-        Whether it fails when its map has changed since the baseline.
+    map_rule
+        Which changes of its map since the baseline fail.
     inputs_fail
         Whether it fails when anything that it is made of has changed, versions of odscen and SUMO
         apart.
@@ -173,7 +179,7 @@ class Case:
     baseline: Path | None
     time_limit: float | None = None
     better_fails: bool = False
-    map_fails: bool = False
+    map_rule: MapRule = "lanes"
     inputs_fail: bool = False
     redraw: Redraw = "open"
     detect: Detection | None = None
@@ -347,7 +353,7 @@ def _case_of_entry(
         baseline=None if folder is None else folder / f"{name}.json",
         time_limit=entry.time_limit or document.time_limit,
         better_fails=(entry.better or document.better) == "fail",
-        map_fails=(entry.map or document.map) == "fail",
+        map_rule=entry.map or document.map or "lanes",
         inputs_fail=(entry.inputs or document.inputs) == "fail",
         redraw=entry.redraw or document.redraw or "open",
     )
@@ -483,6 +489,10 @@ class CaseResult:
         What its seeds were chosen for; ``None`` where the suite names them.
     notes
         What else should be known.
+    warnings
+        What the checks of the scenario warn of.
+    map_changes, scenario_changes
+        What has changed since the baseline, where map and scenario of before are kept beside it.
     updated
         Whether the baseline was written anew.
     """
@@ -502,6 +512,9 @@ class CaseResult:
     error_code: int = 3
     sizing: Sizing | None = None
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    map_changes: tuple[MapChange, ...] = ()
+    scenario_changes: tuple[ScenarioChange, ...] = ()
     updated: bool = False
 
     @property

@@ -323,7 +323,10 @@ def _seed_result(
     summary = result.summary
     folder, seconds = result.folder if kept else None, summary["wall_seconds"]
     if result.status is RunStatus.FAILED:
-        error = f"seed {seed}: the run failed: {summary['error']}"
+        # The folder is deleted unless runs are kept: its files are named, not where they lay.
+        words = str(summary["error"])
+        words = words if kept else words.replace(f"{result.folder}/", "")
+        error = f"seed {seed}: the run failed: {words}"
         return SeedResult(seed, seconds, error, (), measure(result.folder, summary), folder)
     with in_file(str(suite.file)):
         own = own_values(suite.figures, result, beside=suite.file.parent)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from lxml import etree
 
 from odscen.experiments.suite import CaseStatus
-from odscen.figures.measures.figure import RunFigure
 from odscen.runs import layout
 
 if TYPE_CHECKING:
@@ -22,9 +21,6 @@ if TYPE_CHECKING:
 
 MOST_PROBLEMS = 6
 """Problems that the terminal has of one scenario; JUnit, JSON and the page have all."""
-
-_KEY = ("mean_delay", "mean_travel_time", "mean_speed", "worst_junction_delay", "throughput")
-"""Figures of the run that come first in the headline, beside the counts of road users."""
 
 _IN_HEADLINE = 2
 """Figures of the run in the headline; a place comes after them."""
@@ -62,8 +58,12 @@ def _describe_cause(case: CaseResult) -> str:
     if not case.causes:
         return "behaviour: "
     likeliest = case.causes[0]
-    # What has changed on a map is known by itself; of other inputs the name says more.
-    return f"{likeliest.words if likeliest.name == 'map' else likeliest.name}: "
+    if likeliest.name == "map":  # what has changed on it is known by itself
+        return f"{likeliest.words}: "
+    # Of other inputs the name says most.
+    return (
+        f"{likeliest.name}: {likeliest.details}: " if likeliest.details else f"{likeliest.name}: "
+    )
 
 
 def _describe_worst(case: CaseResult) -> list[str]:
@@ -73,20 +73,12 @@ def _describe_worst(case: CaseResult) -> list[str]:
         return list(case.failures[:_IN_HEADLINE])
     changes = {change.words for change in verdict.failing}
     found = [words for words in case.failures if words not in changes][:1]
-    failing = [change for change in verdict.figures if change.counts]
-    failing.sort(key=lambda change: not _is_key(change))  # the worst first among both
+    failing = [change for change in verdict.figures if change.counts]  # the strongest first
     found += [change.words for change in failing[:_IN_HEADLINE]]
     place = verdict.where
     if place is not None:
         return [*found, f"most at {place.words}" if found else place.words]
     return [*found, NOWHERE] if case.causes else found
-
-
-def _is_key(change: Change) -> bool:
-    """Whether people know the figure at a glance; those of the suite's own they do."""
-    entry = change.entry
-    own = not isinstance(entry, RunFigure)
-    return own or entry.name in _KEY or (isinstance(entry, RunFigure) and entry.count)
 
 
 def _describe_better(case: CaseResult) -> list[str]:
@@ -95,7 +87,10 @@ def _describe_better(case: CaseResult) -> list[str]:
 
 
 def _describe_changed_inputs(case: CaseResult) -> str | None:
-    changed = ", ".join(case.changed_inputs)
+    changed = ", ".join(
+        f"{cause.words} ({cause.details})" if cause.details else cause.words
+        for cause in case.causes
+    )
     return f"changed since the baseline: {changed}" if changed else None
 
 
@@ -132,6 +127,7 @@ def details(case: CaseResult) -> list[str]:
     """All there is to say of a scenario below its headline, one line each."""
     found = [*case.problems, *_describe_better(case)]
     found += [text for text in (where(case), reason(case)) if text]
+    found += [f"warning: {words}" for words in case.warnings]
     return list(dict.fromkeys(text for text in (*found, *case.notes) if text != headline(case)))
 
 
@@ -195,7 +191,12 @@ def _case_data(case: CaseResult) -> dict[str, Any]:
         "wall_seconds": round(case.wall_seconds, 3),
         "problems": list(case.problems),
         "notes": list(case.notes),
+        "warnings": list(case.warnings),
         "changed_inputs": list(case.changed_inputs),
+        "changed_fields": [
+            *(change.to_dict() for change in case.map_changes),
+            *(change.to_dict() for change in case.scenario_changes),
+        ],
         "changes": [_change_data(change) for change in verdict.failing] if verdict else [],
         "better": [_change_data(change) for change in verdict.better] if verdict else [],
         "most_changed": None if most is None else _change_data(most),
@@ -384,7 +385,9 @@ def _test_case(
 
 def _add_outcome(element: etree._Element, tag: str, kind: str, words: Sequence[str]) -> None:
     told = [_writable_text(text) for text in words]
-    etree.SubElement(element, tag, {"message": told[0], "type": kind}).text = "\n".join(told)
+    # An attribute holds no line breaks.
+    first = told[0].splitlines()[0] if told[0] else ""
+    etree.SubElement(element, tag, {"message": first, "type": kind}).text = "\n".join(told)
 
 
 def _writable_text(text: str) -> str:

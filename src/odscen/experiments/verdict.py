@@ -352,10 +352,16 @@ class Cause:
     words
         What has changed about it: ``"the scenario's signals"``, ``"sumo 1.27.0 -> 1.28.0"``. What
         is different on two maps, road by road, would be said here.
+    part
+        Of the scenario, as its document calls it; empty for other inputs.
+    details
+        Fields of that part with both values, where the scenario of before is kept.
     """
 
     name: str
     words: str
+    part: str = ""
+    details: str = ""
 
 
 def causes_between(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[Cause, ...]:
@@ -366,7 +372,11 @@ def causes_between(old: Mapping[str, str], new: Mapping[str, str]) -> tuple[Caus
         key=lambda name: (order.index(name) if name in order else len(order), name),
     )
     return tuple(
-        Cause(_LABELS.get(name, name.removeprefix("scenario.")), _describe_input(name, old, new))
+        Cause(
+            _LABELS.get(name, name.removeprefix("scenario.")),
+            _describe_input(name, old, new),
+            part=name.removeprefix("scenario.") if name.startswith("scenario.") else "",
+        )
         for name in names
         if old.get(name) != new.get(name)
     )

@@ -77,7 +77,7 @@ class PlaceOnMap(NamedTuple):
     hdg
         Direction of driving, rad.
     ring
-        The lane from begin to end of its section, x and y of each corner, metres.
+        The lane from begin to end of its section, x and y in turn, metres.
     parts
         What is within :data:`REACH`: ``stop_line``, ``crosswalk``, ``light``, ``sign``.
     """
@@ -87,7 +87,7 @@ class PlaceOnMap(NamedTuple):
     width: float
     limit: float | None
     hdg: float
-    ring: tuple[tuple[float, float], ...]
+    ring: tuple[float, ...]
     parts: tuple[str, ...]
 
 
@@ -296,7 +296,7 @@ class EditedMap:
             width=round(float(here.width[0]), 3),
             limit=round(speed * 3.6, 3) if math.isfinite(speed) else None,
             hdg=math.remainder(float(here.hdg[0]) + turn, 2.0 * math.pi),
-            ring=tuple((a, b) for a, b in [*left, *right[::-1]]),
+            ring=tuple(value for point in [*left, *right[::-1]] for value in point),
             parts=tuple(parts),
         )
 
@@ -711,7 +711,7 @@ class EditedMap:
             if not any(connection.connecting_road == key.road for connection in kept):
                 self._remove_road(key.road)
             else:
-                lane = replace(self._lane(key), type="none", predecessors=(), successors=())
+                lane = replace(self._lane(key), type="restricted", predecessors=(), successors=())
                 self._replace_lane(key, lane, shape=True)
         self.map.junctions[number] = junction
         return (

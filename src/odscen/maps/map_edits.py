@@ -76,7 +76,7 @@ class LaneWidth(_Edit):
         return bench.widen_lane(bench.find_lane(*xy, self.at.hdg), self.width)
 
 
-class SpeedLimit(_Edit):
+class LaneLimit(_Edit):
     """Give the lane, its direction or all lanes of the section there a limit, km/h."""
 
     kind: Literal["speed_limit"]
@@ -232,7 +232,7 @@ class TurnEdit(_Edit):
 
 MapEdit = Annotated[
     LaneWidth
-    | SpeedLimit
+    | LaneLimit
     | LaneAccess
     | RoadMarkEdit
     | StopLineEdit

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 from odscen.figures.judging.actor_measures import RunRecords
 from odscen.figures.measures.summary import actors_from_json
+from odscen.records.replay import body_centres
 from odscen.records.run_events import events_from_json
+from odscen.records.run_plan import Plan
 from odscen.runs import layout
 from odscen.runs.recorded import read_conflicts, trajectory_files
 
@@ -29,6 +31,7 @@ def read_judged(folder: Path) -> RunRecords:
         events_from_json((folder / layout.EVENTS_FILE).read_text(encoding="utf-8")),
         read_conflicts(folder),
         lambda actor: _read_speeds(folder, actor),
+        lambda actor: _read_bodies(folder, actor),
     )
 
 
@@ -52,3 +55,22 @@ def _read_speeds(folder: Path, actor: str) -> pl.DataFrame | None:
         if not found.is_empty():
             return found
     return None
+
+
+def _read_bodies(folder: Path, actor: str) -> pl.DataFrame | None:
+    import polars as pl
+
+    files = trajectory_files(folder)
+    plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
+    planned = next((one for one in plan.actors if one.id == actor), None)
+    if not files or planned is None:
+        return None
+    table = pl.scan_parquet(files)
+    named = [one for one in table.collect_schema().names() if one in ("vehicle_id", "person_id")]
+    if not named:
+        return None
+    ours = pl.any_horizontal(pl.col(name).cast(pl.String) == actor for name in named)
+    found = body_centres(table.filter(ours).collect(), plan).select("time", "x", "y", "hdg")
+    if found.is_empty():
+        return None
+    return found.with_columns(length=pl.lit(planned.length), width=pl.lit(planned.width))

@@ -93,6 +93,20 @@ def test_the_fixture_gives_the_run_and_fails_what_falls_short(project, workspace
     assert "expected arrived == 0" in done.stdout
 
 
+@pytest.mark.slow
+def test_paths_are_relative_to_the_file_of_the_test(project, workspace):
+    """From wherever pytest is started, as for any data beside a test."""
+    (project / "deep").mkdir()
+    shutil.move(project / "t_junction_signs.scenario.json", project / "deep" / "mine.scenario.json")
+    (project / "deep" / "test_mine.py").write_text(
+        "import pytest\n\n@pytest.fixture(scope='module')\ndef crossing(odscen_run):\n"
+        "    return odscen_run('mine.scenario.json', until=10)\n\n"
+        "def test_it(crossing):\n    assert crossing.summary['status'] == 'completed'\n"
+    )
+    done = run_pytest(project, workspace, "-q")
+    assert "1 passed" in done.stdout, done.stdout
+
+
 PROJECT = """
 [tool.pytest.ini_options]
 testpaths = ["tests"]

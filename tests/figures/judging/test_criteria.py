@@ -33,7 +33,14 @@ PLAN = Plan("s", 1, 60.0, 0.5, (0.0, 0.0), (planned("hero", ego=True), planned("
 EVENTS = (
     Event(1.0, EventKind.DEPARTED, "hero"),
     Event(2.0, EventKind.DEPARTED, "van"),
-    Event(12.5, EventKind.COLLISION, "van", partner="hero"),
+    Event(3.0, EventKind.RULE_STARTED, "van", rule="cut-in"),
+    Event(
+        12.5,
+        EventKind.COLLISION,
+        "van",
+        partner="hero",
+        values={"impact_speed": 10.0, "overlap": 0.25},
+    ),
     Event(14.0, EventKind.COLLISION, "van", partner="hero"),
     Event(21.0, EventKind.ARRIVED, "hero", travel_time=20.0),
 )
@@ -44,11 +51,19 @@ CONFLICTS = conflict_table(
     ]
 )
 SPEEDS = pl.DataFrame({"time": [1.0, 2.0, 3.0], "speed": [8.0, 15.0, 15.0]})
+BODIES = {
+    name: pl.DataFrame(
+        {"time": [1.0, 2.0], "x": x, "y": [0.0, 3.0], "hdg": [0.0, 0.0],
+         "length": [4.0, 4.0], "width": [2.0, 2.0]}
+    )
+    for name, x in (("hero", [0.0, 4.0]), ("van", [14.0, 10.0]))
+}  # fmt: skip
 RECORDS = RunRecords(
     actor_outcomes(PLAN, EVENTS, {"hero": Trip(4.0, 1.5, 1)}),
     EVENTS,
     CONFLICTS,
     lambda actor: SPEEDS if actor == "hero" else None,
+    BODIES.get,
 )
 SUMMARY = {
     "actors": {"planned": 2, "arrived": 1, "collided": 2},
@@ -74,6 +89,17 @@ def rows(*criteria: str, records: RunRecords = RECORDS) -> Sequence[dict[str, ob
         ("delay(hero) <= 5 s", 4.0, True, 21.0),
         ("delay(van) <= 5 s", None, False, None),
         ("max_speed(van) <= 50 km/h", None, False, None),
+        ("impact_speed(hero) <= 20 km/h", 36.0, False, 12.5),
+        ("impact_overlap(hero) >= 0.2", 0.25, True, 12.5),
+        ("stopped(hero) == 1", 0.0, False, None),
+        ("max_deceleration(hero) <= 3", 0.0, True, 3.0),
+        ("max_jerk(hero) <= 5", 7.0, False, 2.0),
+        ("min_distance(hero,van) >= 3 m", 2.0, False, 2.0),
+        ("min_distance(ego,bus) >= 3 m", None, False, None),
+        ("fired(cut-in) == 1", 1.0, True, 3.0),
+        ("fired_at(cut-in) <= 2.5 s", 3.0, False, 3.0),
+        ("fired(other) == 0", 0.0, True, None),
+        ("fired_at(other) <= 2.5 s", None, False, None),
         ("collided == 0", 2.0, False, 12.5),
         ("min_ttc >= 1 s", 0.6, False, 3.0),
         ("arrived >= 95 %", 50.0, False, None),
@@ -123,6 +149,9 @@ def test_criticality_that_was_not_measured_is_not_met() -> None:
         ("min_ttc(hero)>=1.5", "Shortest time to collision (TTC) of hero: at least 1.5 s"),
         ("max_speed(hero) <= 50 km/h", "Highest speed of hero: at most 50 km/h"),
         ("mean_delay <= 40 s", "Mean delay: at most 40 s"),
+        ("min_distance(hero,van) >= 3 m", "Shortest distance of hero to van: at least 3 m"),
+        ("fired(cut-in) == 1", "cut-in fires"),
+        ("stopped(hero) == 1", "hero comes to a standstill"),
     ],
 )
 def test_criteria_are_sentences(text: str, words: str) -> None:

@@ -78,6 +78,8 @@ class CheckedRun:
         What plays it.
     unsupported
         What the simulator does not do of it; no error is among them.
+    warnings
+        What the checks of the scenario warn of.
     """
 
     name: str
@@ -88,6 +90,7 @@ class CheckedRun:
     settings: RunSettings
     simulator: AnySimulator
     unsupported: tuple[Problem, ...] = ()
+    warnings: tuple[Problem, ...] = ()
 
     @property
     def map(self) -> LoadedMap:
@@ -142,11 +145,13 @@ def check_run(
     loaded, assets = load_map(entry), workspace.assets()
     parking = loaded.sumo.parking
     found = check(scenario, loaded.sumo.graph, assets, loaded.lights, parking=parking)
-    refuse_errors((*found, *criteria_problems(scenario)))
+    warnings = refuse_errors((*found, *criteria_problems(scenario)))
     unsupported = unsupported_parts(simulator, scenario, run_map(entry, assets))
     refuse_errors(unsupported)
     folder = (workspace.runs if out is None else as_path(out)) / name
-    return CheckedRun(name, scenario, entry, assets, folder, settings, simulator, unsupported)
+    return CheckedRun(
+        name, scenario, entry, assets, folder, settings, simulator, unsupported, warnings
+    )
 
 
 def run_map(entry: MapEntry, assets: Assets) -> RunMap:

@@ -7,6 +7,7 @@ collects scenario files only where it is asked to: named on the command line, or
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 import pytest
@@ -109,12 +110,13 @@ def odscen_run(
 ) -> Callable[..., Run]:
     """Return a function that runs a scenario and gives the finished :class:`Run`.
 
-    ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``. A run that
-    fails or falls short of ``expect`` fails the test. Fixtures of any scope can use it.
+    ``odscen_run(path, seed=None, until=None, expect=(), workspace=None)``; the path is relative to
+    the file of the test, or to the working directory. A run that fails or falls short of ``expect``
+    fails the test. Fixtures of any scope can use it.
     """
 
     def run(
-        scenario: Path,
+        scenario: str | Path,
         *,
         seed: int | None = None,
         until: float | None = None,
@@ -152,7 +154,7 @@ def _make_settings(
 def _run_scenario(
     config: pytest.Config,
     out: Path,
-    scenario: Path,
+    scenario: str | Path,
     settings: RunSettings,
     *,
     workspace: Path | None = None,
@@ -167,7 +169,14 @@ def _run_scenario(
     if not named and configured:
         named = (config.inipath or config.rootpath / "-").parent / configured
     store = Workspace.open(Path(named) if named else None)
-    return runs.run(store, Path(scenario), settings=settings, out=out)
+    return runs.run(store, _beside_test(config, Path(scenario)), settings=settings, out=out)
+
+
+def _beside_test(config: pytest.Config, scenario: Path) -> Path:
+    """A relative path is one from the folder of the test file; from where pytest runs if not."""
+    test, _, _ = os.environ.get("PYTEST_CURRENT_TEST", "").partition("::")
+    near = (config.rootpath / test).parent / scenario
+    return near if test and near.is_file() else scenario
 
 
 def _list_shortcomings(result: Run) -> list[str]:

@@ -6,8 +6,11 @@ as those of the run are.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from odscen.figures.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC
 from odscen.figures.measures.figure import Basis, Better, Figure
@@ -15,12 +18,13 @@ from odscen.records.outcomes import ActorStatus
 from odscen.records.run_events import EventKind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import polars as pl
 
     from odscen.figures.measures.summary import ActorOutcome
     from odscen.records.run_events import Event
+    from odscen.scenario.story.road_view import ActorView
 
 
 class Measured(NamedTuple):
@@ -42,12 +46,16 @@ class RunRecords:
     speeds
         ``time`` (s) and ``speed`` (m/s) of an actor by its id, in order of time; ``None`` if no
         trajectory of it was recorded.
+    bodies
+        ``time`` (s), ``x``, ``y`` (m) and ``hdg`` (rad) of the centre of an actor's body, and its
+        ``length`` and ``width`` (m), by its id, in order of time; ``None`` as there.
     """
 
     outcomes: Sequence[ActorOutcome] = ()
     events: Sequence[Event] = ()
     conflicts: pl.DataFrame | None = None
     speeds: Callable[[str], pl.DataFrame | None] = lambda _: None
+    bodies: Callable[[str], pl.DataFrame | None] = lambda _: None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -55,6 +63,22 @@ class ActorMeasure(Figure):
     """A measure of one actor; ``compute`` gives ``None`` where the run has not recorded it."""
 
     compute: Callable[[RunRecords, ActorOutcome], Measured | None]
+    basis: Basis = Basis.ACTORS
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PairMeasure(Figure):
+    """A measure of one actor and another, by its id: ``NAME(ACTOR,OTHER)``."""
+
+    compute: Callable[[RunRecords, ActorOutcome, str], Measured | None]
+    basis: Basis = Basis.ACTORS
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RuleMeasure(Figure):
+    """A measure of a rule, by its id: ``NAME(RULE)``."""
+
+    compute: Callable[[RunRecords, str], Measured | None]
     basis: Basis = Basis.ACTORS
 
 
@@ -125,6 +149,129 @@ def _top_speed(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
         return None
     row = trace.sort("speed", "time", descending=[True, False]).row(0, named=True)
     return Measured(float(row["speed"]), float(row["time"]))
+
+
+def _impacts(name: str, *, first: bool) -> Callable[[RunRecords, ActorOutcome], Measured | None]:
+    """The first or the largest value of an actor's collisions; without any 0, or nothing."""
+
+    def found(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
+        hits = [
+            event
+            for event in records.events
+            if event.kind is EventKind.COLLISION and outcome.id in (event.actor, event.partner)
+        ]
+        known = [
+            Measured(event.values[name], event.time)
+            for event in hits
+            if event.values is not None and name in event.values
+        ]
+        if not hits and not first:
+            return Measured(0.0)
+        if not known:  # SUMO says of those that it has found neither speed nor place
+            return None
+        return known[0] if first else max(known, key=lambda one: one.value)
+
+    return found
+
+
+_STOPPED = 0.1
+"""m/s."""
+_SPAN = 0.5
+"""Seconds over which accelerations are means where their change is asked for."""
+
+
+def _highest_deceleration(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
+    trace = records.speeds(outcome.id)
+    if trace is None or trace.height < 2:
+        return None
+    times, speeds = (trace.sort("time")[name].to_numpy() for name in ("time", "speed"))
+    lost = -np.diff(speeds) / np.diff(times)
+    row = int(np.argmax(lost))
+    return Measured(max(0.0, float(lost[row])), float(times[row + 1]))
+
+
+def _highest_jerk(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
+    trace = records.speeds(outcome.id)
+    if trace is None or trace.height < 3:
+        return None
+    times, speeds = (trace.sort("time")[name].to_numpy() for name in ("time", "speed"))
+    rows = max(1, round(_SPAN / float(np.median(np.diff(times)))))
+    if len(times) <= 2 * rows:
+        return None
+    span = times[rows:] - times[:-rows]
+    gained = (speeds[rows:] - speeds[:-rows]) / span
+    jerks = np.abs(gained[rows:] - gained[:-rows]) / span[rows:]
+    row = int(np.argmax(jerks))
+    return Measured(float(jerks[row]), float(times[row + rows]))
+
+
+def _comes_to_standstill(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
+    trace = records.speeds(outcome.id)
+    if trace is None or trace.is_empty():
+        return None
+    times, speeds = (trace.sort("time")[name].to_numpy() for name in ("time", "speed"))
+    moved = np.maximum.accumulate(speeds >= _STOPPED)
+    stood = np.flatnonzero(moved & (speeds < _STOPPED))
+    return Measured(1.0, float(times[stood[0]])) if stood.size else Measured(0.0)
+
+
+def _shortest_distance(records: RunRecords, outcome: ActorOutcome, other: str) -> Measured | None:
+    from odscen.scenario.story.condition_kinds import body_distance
+
+    own, its = records.bodies(outcome.id), records.bodies(other)
+    if own is None or its is None:
+        return None
+    best = Measured(math.inf)
+    for one, two in _bodies_at_once(own, its):
+        least = math.dist((one.x, one.y), (two.x, two.y)) - _reach(one) - _reach(two)
+        if least < best.value and (away := body_distance(one, two)) < best.value:
+            best = Measured(away, one.standing)
+    return best if best.value < math.inf else None
+
+
+def _reach(body: ActorView) -> float:
+    return math.hypot(body.length, body.width) / 2.0
+
+
+def _bodies_at_once(own: pl.DataFrame, its: pl.DataFrame) -> Iterator[tuple[ActorView, ActorView]]:
+    """Both bodies at the instants at which both were there, which is ``standing`` of them."""
+    for row in own.join(its, on="time", suffix="_other").sort("time").iter_rows(named=True):
+        yield (
+            _body_of_row(row, ""),
+            _body_of_row(row, "_other"),
+        )
+
+
+def _body_of_row(row: Mapping[str, float], suffix: str) -> ActorView:
+    from odscen.scenario.story.road_view import ActorView
+
+    x, y, hdg, length, width = (
+        row[f"{name}{suffix}"] for name in ("x", "y", "hdg", "length", "width")
+    )
+    return ActorView(
+        "", x, y, hdg, 0.0, 0.0, length, width, 0.0, person=False, standing=row["time"]
+    )
+
+
+def _rule_instant(records: RunRecords, rule: str) -> float | None:
+    return next(
+        (
+            event.time
+            for event in records.events
+            if event.kind is EventKind.RULE_STARTED and event.rule == rule
+        ),
+        None,
+    )
+
+
+def _has_fired(records: RunRecords, rule: str) -> Measured:
+    time = _rule_instant(records, rule)
+    return Measured(float(time is not None), time)
+
+
+def _fired_at(records: RunRecords, rule: str) -> Measured | None:
+    time = _rule_instant(records, rule)
+    return None if time is None else Measured(time, time)
 
 
 _SSM = "FHWA-RD-03-050; SUMO's SSM device"
@@ -240,11 +387,93 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         better=Better.LOWER,
         compute=_of_outcome("waiting_time"),
     ),
+    ActorMeasure(
+        name="impact_speed",
+        unit="m/s",
+        label="impact speed",
+        definition="Highest speed of the actor and whom it collided with to each other; 0 without.",
+        source="events",
+        better=Better.LOWER,
+        compute=_impacts("impact_speed", first=False),
+    ),
+    ActorMeasure(
+        name="impact_overlap",
+        unit="",
+        label="overlap at impact",
+        definition="Share of the width of who hits that the other one is in front of, first time.",
+        source="events",
+        compute=_impacts("overlap", first=True),
+    ),
+    ActorMeasure(
+        name="stopped",
+        unit="",
+        label="came to a standstill",
+        definition="1 if the actor, once under way, was below 0.1 m/s; 0 if not.",
+        source="trajectories",
+        compute=_comes_to_standstill,
+    ),
+    ActorMeasure(
+        name="max_deceleration",
+        unit="m/s2",
+        label="highest deceleration",
+        definition="Highest loss of speed from one record to the next, over the time between.",
+        source="trajectories",
+        better=Better.LOWER,
+        compute=_highest_deceleration,
+    ),
+    ActorMeasure(
+        name="max_jerk",
+        unit="m/s3",
+        label="highest jerk",
+        definition="Highest change of acceleration per second, of means over half a second.",
+        source="trajectories",
+        better=Better.LOWER,
+        compute=_highest_jerk,
+    ),
 )
 """In the order in which they are offered."""
 
 _BY_NAME = {measure.name: measure for measure in ACTOR_MEASURES}
 ACTOR_NAMES = tuple(_BY_NAME)
+
+
+PAIR_MEASURES = (
+    PairMeasure(
+        name="min_distance",
+        unit="m",
+        label="shortest distance",
+        definition="Shortest distance between the bodies of two actors; 0 where they touch.",
+        source="trajectories",
+        better=Better.HIGHER,
+        compute=_shortest_distance,
+    ),
+)
+RULE_MEASURES = (
+    RuleMeasure(
+        name="fired",
+        unit="",
+        label="firing",
+        definition="1 if a rule has fired, 0 if not.",
+        source="events",
+        compute=_has_fired,
+    ),
+    RuleMeasure(
+        name="fired_at",
+        unit="s",
+        label="instant of firing",
+        definition="When a rule has first fired, of one that has.",
+        source="events",
+        compute=_fired_at,
+    ),
+)
+Measure = ActorMeasure | PairMeasure | RuleMeasure
+
+
+def measure_of(name: str, about: str) -> Measure | None:
+    """Measure of what is written in brackets: two ids with a comma, or the id of one or a rule."""
+    if "," in about:
+        return next((one for one in PAIR_MEASURES if one.name == name), None)
+    return actor_measure(name) or next((one for one in RULE_MEASURES if one.name == name), None)
 
 
 def actor_measure(name: str) -> ActorMeasure | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
+from odscen.figures.judging.actor_measures import RuleMeasure
 from odscen.figures.judging.expectations import EGO, Expectation, evaluate, parse_expectation
 from odscen.scenario.document.problems import Problem, error, warning
 
@@ -29,6 +30,7 @@ def _find_problems(scenario: Scenario) -> Iterator[Problem]:
     known = {actor.id for actor in scenario.actors}
     flows = tuple(f"{flow.id}." for flow in scenario.flows)
     egos = any(actor.ego for actor in scenario.actors)
+    rules = {rule.id for rule in scenario.rules}
     for index, text in enumerate(scenario.criteria):
         where = f"criteria[{index}]"
         try:
@@ -41,9 +43,19 @@ def _find_problems(scenario: Scenario) -> Iterator[Problem]:
             yield error("criterion_unknown", where, msg)
         if text in scenario.criteria[:index]:
             yield warning("criterion_twice", where, f"{text!r} is there already")
-        actor = wanted.actor
-        if actor is None or actor in known or actor.startswith(flows):
+        if isinstance(wanted.figure, RuleMeasure):
+            if wanted.actor not in rules:
+                msg = f"no rule has the id {wanted.actor!r}, about which the criterion is"
+                yield error("criterion_without_actor", where, msg)
             continue
+        missing = [
+            actor
+            for actor in ((wanted.actor or "").split(",") if wanted.actor is not None else ())
+            if actor not in known and not actor.startswith(flows)
+        ]
+        if not missing:
+            continue
+        actor = missing[0]
         if actor != EGO:
             msg = f"no actor has the id {actor!r}; a criterion is about an actor, or {EGO}"
             yield error("criterion_without_actor", where, msg)

@@ -7,7 +7,8 @@ with a number from 0 to 1 that is written with a decimal point, or followed by `
 share of the planned actors: ``arrived>=0.95``, ``arrived>=95%`` and ``arrived==1.0`` are shares,
 ``arrived>=1`` and ``collided==0`` are counts.
 ``NAME(ACTOR) OP NUMBER [UNIT]`` is about one actor, by its id: ``min_ttc(car-1) >= 1.5 s``;
-``ego`` means every ego, unless an actor has this id. Names are those of
+``ego`` means every ego, unless an actor has this id. ``NAME(ACTOR,OTHER) OP NUMBER [UNIT]`` is
+about two, ``NAME(RULE) OP NUMBER [UNIT]`` about a rule. Names are those of
 :mod:`odscen.figures.judging.actor_measures`.
 A value that a run does not have meets no limit; measures of encounters in tables of cases are the
 exception, see :mod:`odscen.experiments.table`.
@@ -28,9 +29,11 @@ from odscen.base.errors import InputError
 from odscen.figures.judging.actor_measures import (
     ACTOR_NAMES,
     Measured,
+    PairMeasure,
+    RuleMeasure,
     RunRecords,
-    actor_measure,
     first_event,
+    measure_of,
     worst_conflict,
 )
 from odscen.figures.measures.figure import Basis, RunFigure
@@ -41,7 +44,7 @@ from odscen.records.run_events import EventKind
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from odscen.figures.judging.actor_measures import ActorMeasure
+    from odscen.figures.judging.actor_measures import Measure
     from odscen.figures.measures.figure import Figure
 
 NAMES = names_of("run")
@@ -66,6 +69,9 @@ _PLAIN = {
     ("arrived", "==", 1.0): "reaches its goal",
     ("arrived", ">=", 1.0): "reaches its goal",
     ("collided", "==", 0.0): "does not collide",
+    ("stopped", "==", 1.0): "comes to a standstill",
+    ("fired", "==", 1.0): "fires",
+    ("fired", "==", 0.0): "does not fire",
 }
 """What is asked of an actor most, as one says it."""
 _PATTERN = re.compile(
@@ -102,7 +108,7 @@ class Expectation:
     @property
     def figure(self) -> Figure | None:
         """What it is about; ``None`` for figures of a suite's own, ``usable`` and ``criteria``."""
-        return run_figure(self.name) if self.actor is None else actor_measure(self.name)
+        return run_figure(self.name) if self.actor is None else measure_of(self.name, self.actor)
 
     @property
     def words(self) -> str:
@@ -113,7 +119,8 @@ class Expectation:
         plain = _PLAIN.get((self.name, self.op, self.bound))
         if self.actor is not None and plain is not None:
             return f"{self.actor} {plain}"
-        about = figure.label if self.actor is None else f"{figure.label} of {self.actor}"
+        who = (self.actor or "").replace(",", " to ")
+        about = figure.label if self.actor is None else f"{figure.label} of {who}"
         bound = f"{match['number']} {self.unit}".rstrip()
         return f"{about[0].upper()}{about[1:]}: {_OPERATOR_WORDS[self.op]} {bound}"
 
@@ -208,7 +215,7 @@ def parse_expectation(
     if columns is not None:
         figure = columns[name]
     if match["actor"] is not None:
-        figure, names = actor_measure(name), ACTOR_NAMES
+        figure, names = measure_of(name, match["actor"]), ACTOR_NAMES
     counts = isinstance(figure, RunFigure) and figure.count
     if figure is None:
         kind, hint = _KIND[names is NAMES], _suggest_names(name, names)
@@ -278,19 +285,23 @@ def _measure_expectation(
 ) -> Measured | None:
     measure = expectation.figure
     if expectation.actor is not None:
-        return _of_actors(expectation, cast("ActorMeasure", measure), records)
+        return _of_actors(expectation, cast("Measure", measure), records)
     value = _value_of_figure(expectation, summary)
     return None if value is None else Measured(value, _instant_of_figure(expectation.name, records))
 
 
-def _of_actors(
-    expectation: Expectation, measure: ActorMeasure, records: RunRecords
-) -> Measured | None:
-    """Value of the actor; of several egos the one that is furthest from meeting it."""
-    chosen = [outcome for outcome in records.outcomes if outcome.id == expectation.actor]
-    if not chosen and expectation.actor == EGO:
+def _of_actors(expectation: Expectation, measure: Measure, records: RunRecords) -> Measured | None:
+    """Value of the actor or rule; of several egos the one that is furthest from meeting it."""
+    if isinstance(measure, RuleMeasure):
+        return measure.compute(records, expectation.actor or "")
+    actor, _, other = (expectation.actor or "").partition(",")
+    chosen = [outcome for outcome in records.outcomes if outcome.id == actor]
+    if not chosen and actor == EGO:
         chosen = [outcome for outcome in records.outcomes if outcome.ego]
-    found = [measure.compute(records, outcome) for outcome in chosen]
+    if isinstance(measure, PairMeasure):
+        found = [measure.compute(records, outcome, other) for outcome in chosen]
+    else:
+        found = [measure.compute(records, outcome) for outcome in chosen]
     known = [measured for measured in found if measured is not None]
     if not known or len(known) < len(found):
         return None

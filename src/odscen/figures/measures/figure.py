@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _CONVERSIONS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "min": 60.0, "h": 3600.0},
     "m/s2": {"m/s2": 1.0},
+    "m/s3": {"m/s3": 1.0},
     "m": {"m": 1.0, "cm": 0.01, "km": 1000.0},
     "m/s": {"m/s": 1.0, "km/h": 1.0 / 3.6},
     "km": {"km": 1.0, "m": 0.001},

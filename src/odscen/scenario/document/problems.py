@@ -159,14 +159,15 @@ def limited(
             yield more if where is None else replace(more, where=where)
 
 
-def refuse_errors(problems: Iterable[Problem], *, file: str | None = None) -> None:
-    """Raise :class:`ScenarioError` with the errors among ``problems``; warnings pass.
+def refuse_errors(problems: Iterable[Problem], *, file: str | None = None) -> tuple[Problem, ...]:
+    """Raise :class:`ScenarioError` with the errors among ``problems``; warnings are given back.
 
     Of each kind as many are listed as :func:`limited` does.
     """
+    problems = tuple(problems)
     errors = [problem for problem in problems if problem.severity == "error"]
     if not errors:
-        return
+        return problems
     if len(errors) == 1:
         raise ScenarioError(errors[0].message, element=errors[0].where, file=file)
     raise ScenarioError(

@@ -138,7 +138,7 @@ def show_place(name: str, x: float, y: float, shared: Shared) -> PlaceInfo:
         place = map_to_mend(shared.workspace.map(name)).describe_place(x, y)
     except EditRefusedError as error:
         raise InputError(str(error)) from error
-    return PlaceInfo.model_validate({**place._asdict(), "ring": [*place.ring]})
+    return PlaceInfo.model_validate(place._asdict())
 
 
 @router.get("/maps/{name}/edits")

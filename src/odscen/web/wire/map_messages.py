@@ -175,9 +175,10 @@ class MapDetails(MapInfo):
 
 
 class PlaceInfo(Answer):
-    """What is at a place of a map: its lane, with outline, and what is near it.
+    """What is at a place of a map: its lane, and what is near it.
 
-    Width in metres, limit in km/h, direction of driving in rad.
+    Width in metres, limit in km/h, direction of driving in rad; ``ring`` is the outline of the
+    lane, x and y in turn.
     """
 
     road: str
@@ -185,7 +186,7 @@ class PlaceInfo(Answer):
     width: float
     limit: float | None
     hdg: float
-    ring: list[Point]
+    ring: list[float]
     parts: list[Literal["stop_line", "crosswalk", "light", "sign"]]
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from odscen.base.categories import Category
+from odscen.figures.judging.criteria import criteria_rows
 from odscen.lanegraph.query import node_index
+from odscen.runs.judged import read_judged
 from odscen.scenario.checks.scenario_checks import check
 from tests.sumo.story_case import (
     MIDDLE,
@@ -119,6 +122,32 @@ def test_bodies_have_their_size_and_start_exactly_where_they_are_put(tmp_path: P
     [hit] = [one for one in found.events if one.kind == "collision"]
     assert hit.time == pytest.approx(2.5, abs=0.01)
     assert (hit.values or {})["overlap"] == pytest.approx(0.5, abs=0.01)
+    texts = (
+        "impact_speed(ego) >= 11.99",
+        "impact_overlap(ego) >= 0.49",
+        "min_distance(ego,other) > 0",
+        "stopped(ego) == 1",
+    )
+    rows = criteria_rows(texts, {}, read_judged(tmp_path / "run"))
+    assert [row["passed"] for row in rows] == [True, True, False, False]
+    assert [row["value"] for row in rows] == pytest.approx([12.0, 0.5, 0.0, 0.0], abs=0.01)
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_the_instant_and_place_of_an_impact_while_braking_are_those_of_the_closed_form(
+    tmp_path: Path, step: float
+) -> None:
+    """CCRb: from 20 m/s with 4 m/s² after 1 s, onto a stopped car some 60 m ahead."""
+    actors = [car("ego", 370.0, 20.0, ego=True), car("other", 435.0, 0.0)]
+    rules = [after(1.0, {"brake": {"by": 4.0}})]
+    found = run(document(MOTORWAY, actors, rules, step=step, until=8.0), tmp_path / "run")
+    gap = gap_at_start(found)
+    [hit] = [one for one in found.events if one.kind == "collision"]
+    braked = (20.0 - math.sqrt(400.0 - 8.0 * (gap - 20.0))) / 4.0
+    assert hit.time == pytest.approx(1.0 + braked, abs=0.05)
+    assert (hit.values or {})["impact_speed"] == pytest.approx(20.0 - 4.0 * braked, abs=0.2)
+    other = found.tracks["other"]
+    assert hit.x == pytest.approx(other.x[0] - other.length, abs=0.05)
 
 
 def test_who_overlaps_at_first_is_told_and_those_whom_the_story_drives_may(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.records.run_events import Event, EventKind
 from odscen.scenario.story.condition_kinds import overlap
@@ -30,6 +30,53 @@ _RUNS = 10.0
 """m/s; nobody on foot is faster."""
 
 
+_HARDEST = 12.0
+"""m/s²; a speed that changes more in a step has leapt, and not changed evenly."""
+_PIECE = 0.1
+"""Seconds between looks within a step: in longer ones bodies pass through one another."""
+
+
+class _Motion(NamedTuple):
+    """Where a body was at the end of a step, and how fast: metres, radians, m/s."""
+
+    x: float
+    y: float
+    hdg: float
+    speed: float
+
+
+class _Swept(NamedTuple):
+    """A body in the last step: as it is now, and its motion a step before, if it was seen."""
+
+    now: ActorView
+    before: _Motion | None
+    step: float
+
+    def view(self, back: float) -> ActorView:
+        """The body so many seconds ago.
+
+        Speeds that are seen are means over steps, as SUMO's are: of an even change the speed was
+        ``(b + n) / 2`` when the step began and is ``(3 n - b) / 2`` now, ``b`` and ``n`` the means.
+        """
+        now, before, step = self.now, self.before, self.step
+        first = last = now.speed
+        if before is not None and abs(now.speed - before.speed) <= _HARDEST * step:
+            first = (before.speed + now.speed) / 2.0
+            last = max(0.0, 2.0 * now.speed - first)
+        share = back / step
+        gone = back * (last - (last - first) * share / 2.0)
+        hdg = now.hdg
+        if before is not None:
+            hdg -= share * math.remainder(now.hdg - before.hdg, math.tau)
+        if before is None:
+            x, y = now.x - gone * math.cos(hdg), now.y - gone * math.sin(hdg)
+        else:  # on the way between the two places, which may lead aside
+            covered = math.dist((before.x, before.y), (now.x, now.y))
+            part = min(1.0, gone / covered) if covered > 0.0 else 0.0
+            x, y = now.x + part * (before.x - now.x), now.y + part * (before.y - now.y)
+        return replace(now, x=x, y=y, hdg=hdg, speed=last - (last - first) * share)
+
+
 class BodyContacts:
     """Finds when bodies of moved road users begin to overlap others."""
 
@@ -44,18 +91,23 @@ class BodyContacts:
         self._offset = net_offset
         self._touching: set[tuple[str, str]] = set()
         self._seen: dict[str, tuple[float, ActorView]] = {}
+        self._before: dict[str, _Motion] = {}
 
     def look_at_all(self) -> None:
         """Read everybody again: somebody is elsewhere than he drove."""
         self._seen.clear()
 
-    def state(self) -> list[list[str]]:
+    def state(self) -> dict[str, Any]:
         """What has to be remembered, for JSON."""
-        return sorted(list(pair) for pair in self._touching)
+        return {
+            "touching": sorted(list(pair) for pair in self._touching),
+            "before": {name: list(motion) for name, motion in self._before.items()},
+        }
 
     def restore(self, state: Any) -> None:
         """Inverse of :meth:`state`."""
-        self._touching = {(one, other) for one, other in state}
+        self._touching = {(one, other) for one, other in state["touching"]}
+        self._before = {name: _Motion(*motion) for name, motion in state["before"].items()}
 
     def look(
         self,
@@ -68,27 +120,41 @@ class BodyContacts:
         """Contacts that began in the step that led to ``time``; those that SUMO saw are left."""
         moved = [name for name, move in moves.items() if move.exact or move.pose is not None]
         if not moved:
-            self._touching = set()
+            self._touching, self._before = set(), {}
             return []
         touching: set[tuple[str, str]] = set()
-        begun: list[tuple[ActorView, ActorView]] = []
+        begun: list[tuple[_Swept, _Swept, float]] = []
+        seen: dict[str, _Motion] = {}
         for name in sorted(moved):
             one = view.actor(name)
             if one is None:
                 continue
-            for other in self._possible_contacts(one, road, view, moves):
+            seen[name] = _Motion(one.x, one.y, one.hdg, one.speed)
+            for other in self._possible_contacts(one, road, view, moves, step):
+                seen[other.id] = _Motion(other.x, other.y, other.hdg, other.speed)
                 pair = min(one.id, other.id), max(one.id, other.id)
-                if pair not in touching and overlap(one.corners, other.corners):
+                if pair in touching:
+                    continue
+                if pair in self._touching:
+                    if overlap(one.corners, other.corners):
+                        touching.add(pair)
+                    continue
+                swept = self._swept(one, step), self._swept(other, step)
+                back = _first_contact(*swept, step)
+                if back is not None:
                     touching.add(pair)
-                    if pair not in self._touching:
-                        begun.append((one, other))
-        self._touching = touching
+                    begun.append((*swept, back))
+        self._touching, self._before = touching, seen
         known = road.collisions() if begun else set()
         return [
-            _contact_event(one, other, time, step)
-            for one, other in begun
-            if frozenset((one.id, other.id)) not in known or self._has_exact_instant(one, other)
+            _contact_event(one, other, time, back)
+            for one, other, back in begun
+            if frozenset((one.now.id, other.now.id)) not in known
+            or self._has_exact_instant(one.now, other.now)
         ]
+
+    def _swept(self, body: ActorView, step: float) -> _Swept:
+        return _Swept(body, self._before.get(body.id), step)
 
     def leave_out_known(self, events: list[Event], time: float, step: float) -> None:
         """Leave out of the events of a step what SUMO says of contacts that this has found.
@@ -116,8 +182,9 @@ class BodyContacts:
         road: MovedActors,
         view: StoryView,
         moves: Mapping[str, WantedMove],
+        step: float,
     ) -> Iterator[ActorView]:
-        """Those whose bodies may overlap with another's."""
+        """Those whose bodies may overlap with another's, or have done so within the step."""
         time = view.time
         for name in view.names:
             seen = None if name in moves else self._seen.get(name)
@@ -127,7 +194,7 @@ class BodyContacts:
             if other is None or other is actor_view:
                 continue
             self._seen[name] = time, other
-            if _bodies_near(actor_view, other):
+            if _bodies_near(actor_view, other, step):
                 yield other
         lane = road.lane_of(actor_view.id, person=actor_view.person)
         if not lane:
@@ -136,7 +203,7 @@ class BodyContacts:
             planned = self._planned.get(name)
             if planned is not None and name not in view.names:
                 found = stranger(road, planned, self._offset)
-                if found is not None and _bodies_near(actor_view, found):
+                if found is not None and _bodies_near(actor_view, found, step):
                     yield found
 
 
@@ -150,27 +217,46 @@ def _still_far(one: ActorView, other: ActorView, seconds: float) -> bool:
     return abs(one.x - other.x) > reach or abs(one.y - other.y) > reach
 
 
-def _bodies_near(one: ActorView, other: ActorView) -> bool:
+def _bodies_near(one: ActorView, other: ActorView, step: float) -> bool:
     reach = (one.length + one.width + other.length + other.width) / 2.0
+    reach += (one.speed + other.speed) * step
     return abs(one.x - other.x) < reach and abs(one.y - other.y) < reach
 
 
-def _contact_event(one: ActorView, other: ActorView, time: float, step: float) -> Event:
-    """Event of a contact that began in the last step: bodies are taken back along their speed."""
-    early, late = 0.0, step
-    for _ in range(_HALVINGS):
-        back = (early + late) / 2.0
-        if overlap(_view_before(one, back).corners, _view_before(other, back).corners):
-            early = back
-        else:
-            late = back
-    first, second = _view_before(one, early), _view_before(other, early)
-    (ax, ay), (bx, by) = one.velocity, other.velocity
+def _first_contact(one: _Swept, other: _Swept, step: float) -> float | None:
+    """Seconds before the end of a step at which two bodies first overlap in it."""
+    pieces = max(1, math.ceil(step / _PIECE))
+    free: float | None = None
+    for piece in range(pieces, -1, -1):
+        back = step * piece / pieces
+        if not _overlap_before(one, other, back):
+            free = back
+            continue
+        if free is None:
+            return back
+        for _ in range(_HALVINGS):
+            middle = (back + free) / 2.0
+            if _overlap_before(one, other, middle):
+                back = middle
+            else:
+                free = middle
+        return back
+    return None
+
+
+def _overlap_before(one: _Swept, other: _Swept, back: float) -> bool:
+    return overlap(one.view(back).corners, other.view(back).corners)
+
+
+def _contact_event(one: _Swept, other: _Swept, time: float, back: float) -> Event:
+    """Event of a contact that began so many seconds before ``time``."""
+    first, second = one.view(back), other.view(back)
     hitting = max((first, second), key=lambda body: (body.speed, body.id))
     hit = second if hitting is first else first
+    (ax, ay), (bx, by) = hitting.velocity, hit.velocity
     x, y = _touching_point(hitting, hit)
     return Event(
-        time - early,
+        time - back,
         EventKind.COLLISION,
         hitting.id,
         x=x,
@@ -191,11 +277,6 @@ def _overlap_of_width(hitting: ActorView, hit: ActorView) -> float:
     half = hitting.width / 2.0
     shared = min(max(aside), half) - max(min(aside), -half)
     return max(0.0, shared) / hitting.width
-
-
-def _view_before(actor_view: ActorView, seconds: float) -> ActorView:
-    vx, vy = actor_view.velocity
-    return replace(actor_view, x=actor_view.x - vx * seconds, y=actor_view.y - vy * seconds)
 
 
 def _touching_point(one: ActorView, other: ActorView) -> tuple[float, float]:
