@@ -20,6 +20,7 @@ import pytest
 from lxml import etree
 
 from odscen.app.exchange.exports import export, export_run, export_runs
+from odscen.app.exchange.recorded_traffic import read_recorded_traffic
 from odscen.app.running.batches import run_many
 from odscen.base.errors import DamagedError, InputError
 from odscen.formats import list_formats
@@ -488,3 +489,52 @@ def test_records_that_a_run_has_not_written_itself_are_refused(run: Run, tmp_pat
     shutil.copyfile(folder / "trajectories.parquet", folder / "trajectories" / "part-0001.parquet")
     with pytest.raises(DamagedError, match=r"part-0001\.parquet: expected no such file"):
         Run.open(folder)
+
+
+# ------------------------------------------------------------------------- recorded traffic
+@pytest.mark.parametrize(
+    ("schema", "file", "categories"),
+    [
+        ("interaction", "vehicle_tracks_000.csv", None),
+        ("ind", "00_tracks.csv", None),
+        ("highd", "01_tracks.csv", {"car", "van", "truck", "bus", "motorcycle"}),
+        ("ngsim", "ngsim.csv", {"car", "van", "truck", "bus", "motorcycle"}),
+    ],
+)
+def test_recorded_traffic_is_read_back_within_a_centimetre(
+    workspace: Workspace,
+    run: Run,
+    recorded: States,
+    schema: str,
+    file: str,
+    categories: set[str] | None,
+    tmp_path: Path,
+) -> None:
+    export_run(workspace, run.folder, tmp_path, to="recording", options={"schema": schema})
+    names = json.loads((tmp_path / "road_users.json").read_text(encoding="utf-8"))
+    back = read_recorded_traffic(tmp_path / file).rows
+    found = {
+        (names[re.sub("^P|/.*", "", name)], round(time * 10)): (x, y, hdg, length or 0.0)
+        for name, time, x, y, hdg, length in back.select(
+            "id", "time", "x", "y", "hdg", "length"
+        ).iter_rows()
+    }
+    known = dict(run.trajectories().select("id", "category").unique().iter_rows())
+    expected = {key for key in recorded if categories is None or str(known[key[0]]) in categories}
+    if schema == "highd":  # those that drive along x all the time
+        across = {key[0] for key, state in recorded.items() if abs(np.sin(state[2])) > 0.35}
+        expected = {key for key in expected if key[0] not in across}
+    assert found.keys() == expected
+    assert len(expected) > 50
+    for key, (x, y, hdg, length) in found.items():
+        was = recorded[key]
+        # NGSIM has the middle of the front and no heading: that place is what comes back.
+        half = length / 2.0 if schema == "ngsim" else 0.0
+        front = (x + half * np.cos(hdg), y + half * np.sin(hdg))
+        there = (was[0] + half * np.cos(was[2]), was[1] + half * np.sin(was[2]))
+        assert front == pytest.approx(there, abs=0.01), key
+
+
+def test_a_schema_that_is_none_is_refused(workspace: Workspace, run: Run, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="schema is one of interaction, ind, highd, ngsim"):
+        export_run(workspace, run.folder, tmp_path, to="recording", options={"schema": "kitti"})

@@ -39,6 +39,7 @@ _GROUPS: dict[str, tuple[str, dict[str, str]]] = {
     "signals": ("signal_commands:app", {}),
     "transit": ("transit_commands:app", {}),
     "trash": ("removal_commands:trash", {}),
+    "recording": ("recording_commands:app", {}),
     "learn": ("learn_command:app", {}),
     "study": ("study_commands:app", {}),
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,13 +25,6 @@ if TYPE_CHECKING:
 _READ = {name: one for name, one in list_formats().items() if one.read is not None}
 _WRITTEN = {name: one for name, one in list_formats().items() if one.write is not None}
 _LISTED_SUFFIXES = list(dict.fromkeys(end for reader in _READ.values() for end in reader.suffixes))
-
-
-class EgoChoice(StrEnum):
-    """What drives the ego."""
-
-    SUMO = "sumo"
-    STORY = "story"
 
 
 def _check_written(text: str) -> str:
@@ -87,8 +79,18 @@ def import_(
         ),
     ] = None,
     ego: Annotated[
-        EgoChoice | None,
-        typer.Option(help="What drives the ego: SUMO, or its story. (default: story)"),
+        str | None,
+        typer.Option(
+            help="Of OpenSCENARIO what drives the ego: sumo, or its story. (default: story) Of "
+            "recorded traffic who is the ego, by its id.",
+            metavar="sumo|story|ID",
+        ),
+    ] = None,
+    window: Annotated[
+        str | None,
+        typer.Option(
+            help="Of recorded traffic: part of it, in seconds or H:MM:SS.", metavar="FROM..TO"
+        ),
     ] = None,
     settings: OptionSettings = None,
     workspace: WorkspaceOption = None,
@@ -98,14 +100,13 @@ def import_(
 
     Of an OpenSCENARIO file each element is taken, approximated, ignored or refused. Arrays give the
     scenario that they were written of, with what was changed in them. Problems of the scenario are
-    listed. A recording becomes a table of its tracks.
+    listed. Recorded traffic becomes a table of its tracks, and with a map a scenario.
     """
     from odscen.app.exchange.imports import import_file
     from odscen.maps.store import Workspace
 
     options = _settings_as_options(settings)
-    if ego is not None:
-        options["ego"] = ego.value
+    options |= {name: text for name, text in (("ego", ego), ("window", window)) if text is not None}
     store = Workspace.open(workspace)
     try:
         read = import_file(store, file, out=out, of=of, maps=maps, on_map=on_map, options=options)

@@ -1,35 +1,30 @@
 """Recorded traffic: tracks of road users in the schemas of datasets, OSI traces, CommonRoad.
 
-What is read is in :mod:`odscen.formats.tracks`; this is the entry in the list of formats, and the
-track of one road user as rows of a rule.
+What is read is in :mod:`odscen.formats.tracks`; this is the entry in the list of formats.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError
 from odscen.formats.base import ElementReport, FileContent, Format, FormatOption
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from odscen.formats.base import ImportSource
-    from odscen.scenario.document.rules_document import TrajectoryRow
 
-MOST_ROWS = 100_000
-_LISTED = 8
-"""Names that a message lists at most."""
+FOLLOWS = ("track", "react", "drive")
+"""What a road user of a recording does: follows its track; until the ego is close; never."""
 
 
 def read_tracks(source: ImportSource) -> FileContent:
-    """Tracks of all road users of a file, by road user and time.
+    """Tracks of all road users of a file; with a map, a scenario in which they drive again.
 
     Raises
     ------
     InputError
-        If it is no recorded traffic, or damaged; names the element and the value.
+        If it is no recorded traffic, or damaged; names the element and the value. With a map, if
+        nobody of it is near a lane.
     """
     from odscen.formats.tracks.read_recording import read_recording
 
@@ -44,42 +39,25 @@ def read_tracks(source: ImportSource) -> FileContent:
     others = recorded.rows.filter(recorded.rows["category"].is_null())
     for kind, count in others.group_by("kind").agg(others["id"].n_unique()).sort("kind").rows():
         report.add("ignored", f"{count} of kind {kind}", "no category of road users is that")
-    return FileContent(tracks=recorded.rows, lists=report.lists)
+    if not source.map_given:
+        for name in ("ego", "follow"):
+            if source.options.get(name):
+                raise InputError(f"{name} is of a scenario, which needs a map: give it with --map")
+        return FileContent(tracks=recorded.rows, lists=report.lists)
+    from odscen.formats.tracks.scenario_of_tracks import SceneChoice, scenario_of_tracks
 
-
-def trajectory_rows(
-    tracks: pl.DataFrame, *, of: str | None = None
-) -> tuple[float, tuple[TrajectoryRow, ...]]:
-    """Trajectory of one road user: when it begins, and rows of seconds from then on.
-
-    Parameters
-    ----------
-    tracks
-        ``id``, ``time`` (s), ``x``, ``y`` (m) and ``hdg`` (rad) of body centres.
-    of
-        Its id in the table; not needed if there is one only.
-
-    Raises
-    ------
-    InputError
-        If there is no such road user, or it has fewer than two rows, or too many.
-    """
-    import polars as pl
-
-    ids = tracks["id"].unique().sort().to_list()
-    if of is None and len(ids) != 1:
-        listed = ", ".join(map(str, ids[:_LISTED])) + (", ..." if len(ids) > _LISTED else "")
-        raise InputError(f"there are {len(ids)} road users: {listed}; name one")
-    if of is not None and of not in ids:
-        raise InputError(f"there is no road user {of!r}")
-    own = tracks.filter(pl.col("id") == (ids[0] if of is None else of)).sort("time")
-    if not 2 <= own.height <= MOST_ROWS:
-        raise InputError(f"{own.height} rows; a trajectory has 2 to {MOST_ROWS}")
-    begin = float(own["time"][0])
-    return begin, tuple(
-        (round(time - begin, 6), x, y, math.remainder(hdg, math.tau))
-        for time, x, y, hdg in own.select("time", "x", "y", "hdg").iter_rows()
+    follow = source.options.get("follow", "track")
+    if follow not in FOLLOWS:
+        raise InputError(f"follow is one of {', '.join(FOLLOWS)}, not {follow!r}")
+    scenario = scenario_of_tracks(
+        recorded,
+        source.map(),
+        SceneChoice(source.options.get("ego", ""), follow),
+        name=source.name,
+        assets=source.assets,
+        report=report,
     )
+    return FileContent(scenario=scenario, lists=report.lists)
 
 
 FORMAT = Format(
@@ -87,11 +65,14 @@ FORMAT = Format(
     title="Recorded traffic (CSV, Parquet, OSI)",
     label="tracks of INTERACTION, SinD, levelX, NGSIM, Argoverse 2, CommonRoad, OSI and "
     "omega-prime, or a table of time, x, y and more",
-    of=("run",),
+    of=("scenario", "run"),
     suffixes=(".csv", ".parquet", ".osi", ".mcap"),
     read=read_tracks,
     options=(
         FormatOption("window", "Part of the recording, FROM..TO in s or H:MM:SS."),
+        FormatOption("offset", "Metres east and north, and degrees, to the map's frame: X,Y,D."),
+        FormatOption("ego", "With a map: who is free for SUMO, CARLA or another driver."),
+        FormatOption("follow", "With a map: what the others do.", FOLLOWS, "track"),
         FormatOption("columns", "Columns of another table: time=ms*0.001,id=vehicle,x=east,y=n."),
         FormatOption("case", "Which recording of a file of INTERACTION."),
         FormatOption("location", "Which recording of a file of NGSIM."),

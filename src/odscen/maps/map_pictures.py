@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from odscen.base.arrays import offsets
 from odscen.base.errors import InputError
 from odscen.convert.verify.fidelity_result import NEAR
 from odscen.drawing.legend import RenderOptions
+from odscen.drawing.map_drawing import Lines
 from odscen.drawing.map_sheet import render_drawing, svg_to_png
 from odscen.drawing.svg_layers import PlaceMarks
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from odscen.base.arrays import FloatArray
     from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.maps.map_entry import MapEntry
+
+
+_LINE_COLORS = ("#1667d9", "#0b8f4d", "#b832c7", "#00a7c4", "#a0742f", "#555555")
+_PLACE_COLORS = ("#f0a202", "#d7263d")
+_AROUND = 20.0
+"""Metres around lines that are shown."""
 
 
 class _Placed(Protocol):
@@ -60,6 +70,43 @@ def draw_fidelity(entry: MapEntry, fidelity: Fidelity, out: Path, *, width: int 
         entry.drawing(), statistics=entry.statistics(), marks=_marks_of_departures(fidelity)
     )
     _write_picture(svg, out, width=width)
+
+
+def draw_lines_on_map(
+    entry: MapEntry,
+    lines: Mapping[str, Sequence[FloatArray]],
+    places: Mapping[str, FloatArray],
+    out: Path,
+    *,
+    width: int = 2400,
+) -> None:
+    """Write a drawing of the part of a map around lines and circled places, each by their kind.
+
+    Parameters
+    ----------
+    lines, places
+        By name of the kind, metres in the OpenDRIVE frame: polylines of shape ``(n, 2)``, and
+        places of shape ``(N, 2)``.
+
+    Raises
+    ------
+    InputError, MissingDependencyError
+        As :func:`draw_map`.
+    """
+    _check_ending(out)
+    nowhere = np.empty((0, 2))
+    marks = [
+        PlaceMarks(kind, color, nowhere, Lines(np.concatenate(each), offsets(map(len, each))))
+        for (kind, each), color in zip(lines.items(), cycle(_LINE_COLORS), strict=False)
+    ]
+    marks += [
+        PlaceMarks(kind, color, xy)
+        for (kind, xy), color in zip(places.items(), cycle(_PLACE_COLORS), strict=False)
+    ]
+    all_of_them = np.concatenate([line for each in lines.values() for line in each])
+    low, high = all_of_them.min(axis=0) - _AROUND, all_of_them.max(axis=0) + _AROUND
+    view = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    _write_picture(render_drawing(entry.drawing(), view=view, marks=marks), out, width=width)
 
 
 def _marks_of_departures(fidelity: Fidelity) -> list[PlaceMarks]:

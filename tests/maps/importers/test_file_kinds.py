@@ -25,7 +25,7 @@ from odscen.maps.importers.opendrive import OpenDriveImporter
             "odscen maps importers",
         ),
         (b"<!-- generated on ... -->\n<net/>", "a.net.xml", "a SUMO network", "--sumo-net-file"),
-        (b'<commonRoad commonRoadVersion="2020a"/>', "a.xml", "a CommonRoad scenario", "export"),
+        (b'<commonRoad commonRoadVersion="2020a"/>', "a.xodr", "a CommonRoad scenario", ".xml"),
         (b"\xef\xbb\xbf<OpenSCENARIO/>", "a.xosc", "an OpenSCENARIO file", "odscen import"),
         (b"<kml:kml/>", "a.kml", "XML with the root element <kml>", "convert"),
         (b'{"type": "FeatureCollection"}', "a.json", "GeoJSON", "convert"),
@@ -65,7 +65,7 @@ def test_what_is_no_xml_has_no_root_element() -> None:
     [
         (b'<?xml version="1.0"?><osm version="0.6"/>', "OpenStreetMap, not OpenDRIVE: give it"),
         (b"<net/>", "a SUMO network, not OpenDRIVE: odscen import FILE.net.xml"),
-        (b"<commonRoad/>", "a CommonRoad scenario, not OpenDRIVE: export its map as OpenDRIVE"),
+        (b"<commonRoad/>", "a CommonRoad scenario, not OpenDRIVE: give it the ending .xml"),
         (b"\x0a\x12binary\x00\x01", "binary data, not OpenDRIVE: convert it"),
     ],
 )

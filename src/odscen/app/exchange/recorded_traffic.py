@@ -1,25 +1,107 @@
-"""Recorded traffic of the disk: files of others, and runs of odscen."""
+"""Recorded traffic of the disk: files of others and runs of odscen, on their maps."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from math import degrees
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from odscen.app.exchange.imports import DiskFile
+from odscen.base.errors import InputError
 from odscen.base.given_files import as_path
+from odscen.formats.tracks.lane_places import estimate_offset, fit_on_map
 from odscen.formats.tracks.read_recording import read_recording, time_window
-from odscen.formats.tracks.recorded_traffic import RecordedTraffic, complete_tracks
+from odscen.formats.tracks.recorded_traffic import RecordedTraffic, complete_tracks, shift_tracks
+from odscen.formats.tracks.scenes import exposure, find_scenes
+from odscen.maps.map_pictures import draw_lines_on_map
 from odscen.records.run_plan import Plan
 from odscen.runs import layout
 from odscen.runs.finished_run import Run
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from odscen.base.given_files import GivenPath
+    from odscen.maps.map_entry import MapEntry
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShownRecording:
+    """What is said of a recording.
+
+    Attributes
+    ----------
+    summary
+        Road users, time and area; on a map also ``offset`` (``X,Y,DEGREES``, by which it was moved
+        to lie on it) and ``agreement``.
+    rows
+        Its tracks; on a map with the lanes they are on, moved by the offset.
+    scenes
+        What :func:`~odscen.formats.tracks.scenes.find_scenes` finds.
+    """
+
+    summary: dict[str, Any]
+    rows: pl.DataFrame
+    scenes: pl.DataFrame
+
+
+def show_recording(
+    recorded: RecordedTraffic,
+    entry: MapEntry | None = None,
+    *,
+    estimate: bool = False,
+    picture: Path | None = None,
+) -> ShownRecording:
+    """Describe recorded traffic, and place it on a map.
+
+    Parameters
+    ----------
+    entry
+        The map whose frame its places are in.
+    estimate
+        Whether it is first moved and turned onto the lanes of the map.
+    picture
+        Where map and tracks are drawn, as SVG or PNG.
+
+    Raises
+    ------
+    InputError
+        If a picture or an offset is asked for without a map, or no offset can be estimated.
+    """
+    rows, summary = recorded.rows, recorded.summary()
+    if entry is None:
+        if estimate or picture is not None:
+            raise InputError("an offset or a picture needs a map: give it with --map")
+        scenes = find_scenes(rows)
+        return ShownRecording({**summary, "exposure": exposure(rows, scenes)}, rows, scenes)
+    graph = entry.graph()
+    if estimate:
+        x, y, turn = estimate_offset(rows, graph)
+        summary["offset"] = f"{x:.3f},{y:.3f},{degrees(turn):.4f}"
+        rows = shift_tracks(rows, x, y, turn)
+    rows, summary["agreement"] = fit_on_map(rows, graph)
+    scenes = find_scenes(rows, graph)
+    summary["exposure"] = exposure(rows, scenes)
+    if picture is not None:
+        tracks: dict[str, list[Any]] = {}
+        for (kind, _), own in rows.group_by("category", "id", maintain_order=True):
+            tracks.setdefault(str(kind), []).append(own.select("x", "y").to_numpy())
+        driven = rows.filter(pl.col("category") != "pedestrian")
+        places = {
+            name: driven.filter(where).select("x", "y").to_numpy()
+            for name, where in (
+                ("On no lane", ~pl.col("on_lane")),
+                ("Against its lane", pl.col("wrong_way")),
+            )
+        }
+        draw_lines_on_map(entry, tracks, places, picture)
+    return ShownRecording(summary, rows, scenes)
 
 
 def read_recorded_traffic(
-    path: GivenPath, *, window: str = "", columns: str = "", part: str = ""
+    path: GivenPath, *, window: str = "", columns: str = "", part: str = "", offset: str = ""
 ) -> RecordedTraffic:
     """Tracks of recorded traffic, whatever the schema of its file is.
 
@@ -38,6 +120,9 @@ def read_recorded_traffic(
     part
         Which of several recordings that a file has: ``case_id`` of INTERACTION, ``Location`` of
         NGSIM.
+    offset
+        ``X,Y`` or ``X,Y,DEGREES``: metres east and north, after a turn counter-clockwise about the
+        origin, by which its places become those of a map.
 
     Returns
     -------
@@ -53,6 +138,7 @@ def read_recorded_traffic(
     if file.is_dir():
         return _tracks_of_run(Run.open(file), window)
     options = {"window": window, "columns": columns, "case": part, "location": part}
+    options["offset"] = offset
     return read_recording(DiskFile(file), options)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from odscen.app.exchange.recorded_traffic import read_recorded_traffic
 from odscen.base.errors import ScenarioError, in_file
-from odscen.formats.trajectories_format import trajectory_rows
+from odscen.formats.tracks.recorded_traffic import trajectory_rows
 from odscen.scenario.document.problems import validated
 from odscen.scenario.document.rules_document import StoryRule
 

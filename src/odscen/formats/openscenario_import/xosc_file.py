@@ -240,7 +240,10 @@ def read_xosc_file(source: ImportSource) -> FileContent:
     NoMapError
         If its map is not found, or it names none; has the report of the rest.
     """
-    ego: EgoDriver = "sumo" if source.options.get("ego") == "sumo" else "story"
+    chosen = source.options.get("ego", "story")
+    if chosen not in ("sumo", "story"):
+        raise InputError(f"the ego is driven by sumo or story, not by {chosen!r}")
+    ego: EgoDriver = "sumo" if chosen == "sumo" else "story"
     xosc = _read_tree_and_catalogs(source.file)
     weather = source.assets.weather
     logic = xosc.root.find("RoadNetwork/LogicFile")

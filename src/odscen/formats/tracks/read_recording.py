@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError, in_file
+from odscen.formats.tracks.recorded_traffic import shift_tracks
 from odscen.formats.tracks.table_schemas import TimeWindow, read_track_table
 
 if TYPE_CHECKING:
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
     from odscen.formats.base import GivenFile
     from odscen.formats.tracks.recorded_traffic import RecordedTraffic
 
-SUFFIXES: Final = (".csv", ".parquet", ".osi", ".mcap", ".xml")
 _CLOCK = re.compile(r"(?:(?:(\d+):)?(\d{1,2}):)?(\d+(?:\.\d*)?)")
 
 
@@ -27,7 +28,7 @@ def read_recording(file: GivenFile, options: Mapping[str, str] | None = None) ->
     options
         ``window`` (see :func:`time_window`), ``columns`` (of a table of no published schema:
         ``time=ms*0.001,id=vehicle,x=east,y=north``), ``case`` and ``location`` (which of several
-        recordings that a file of INTERACTION or NGSIM has).
+        recordings that a file of INTERACTION or NGSIM has), ``offset`` (see :func:`map_offset`).
 
     Raises
     ------
@@ -36,18 +37,27 @@ def read_recording(file: GivenFile, options: Mapping[str, str] | None = None) ->
     MissingDependencyError
         If it needs a package that is not installed.
     """
+    options = options or {}
+    window, offset = time_window(options.get("window", "")), map_offset(options.get("offset", ""))
+    with in_file(file.name):
+        recorded = _read_by_ending(file, options, window)
+    if offset == (0.0, 0.0, 0.0):
+        return recorded
+    return replace(recorded, rows=shift_tracks(recorded.rows, *offset))
+
+
+def _read_by_ending(
+    file: GivenFile, options: Mapping[str, str], window: TimeWindow
+) -> RecordedTraffic:
     from odscen.formats.tracks.commonroad_obstacles import read_commonroad_obstacles
     from odscen.formats.tracks.osi_trace import read_osi_trace
 
-    options = options or {}
-    window = time_window(options.get("window", ""))
     name = file.name.lower()
-    with in_file(file.name):
-        if name.endswith((".osi", ".mcap")):
-            return read_osi_trace(file.on_disk, *window)
-        if name.endswith(".xml"):
-            return read_commonroad_obstacles(file.read(), *window)
-        return read_track_table(file, options, window)
+    if name.endswith((".osi", ".mcap")):
+        return read_osi_trace(file.on_disk, *window)
+    if name.endswith(".xml"):
+        return read_commonroad_obstacles(file.read(), *window)
+    return read_track_table(file, options, window)
 
 
 def time_window(text: str) -> TimeWindow:
@@ -70,6 +80,27 @@ def time_window(text: str) -> TimeWindow:
     if window.end <= window.begin:
         raise InputError(f"the window {text!r} ends before it begins")
     return window
+
+
+def map_offset(text: str) -> tuple[float, float, float]:
+    """Metres east, metres north and radians of ``X,Y`` or ``X,Y,DEGREES``, counter-clockwise.
+
+    >>> map_offset("10,-2.5,180")
+    (10.0, -2.5, 3.141592653589793)
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")] if text else [0.0, 0.0]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
+        raise InputError(f"an offset is X,Y or X,Y,DEGREES, not {text!r}")
+    x, y, turn = (*numbers, 0.0)[:3]
+    return x, y, math.radians(turn)
 
 
 def _seconds(text: str, usual: float) -> float:

@@ -18,6 +18,8 @@ from odscen.base.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from odscen.scenario.document.rules_document import TrajectoryRow
+
 TRACK_COLUMNS: Final = {
     "id": pl.String,
     "time": pl.Float64,
@@ -39,6 +41,9 @@ file calls it), ``x``, ``y`` (m, centre of the body, x east and y north or as th
 heading), ``length``, ``width`` (m, null if the file has none) and ``quality``: ``recorded``,
 ``after_gap`` (frames before it are missing) or ``fragment`` (the file doubts it)."""
 
+_MOST_ROWS = 100_000
+_LISTED = 8
+"""Names that a message lists at most."""
 _MOVED = 0.05
 """Metres between the frames before and after from which on they show a direction of motion."""
 _GAP = 1.5
@@ -269,4 +274,37 @@ def shift_tracks(rows: pl.DataFrame, x: float, y: float, turn: float = 0.0) -> p
         x=x + c * pl.col("x") - s * pl.col("y"),
         y=y + s * pl.col("x") + c * pl.col("y"),
         hdg=_without_whole_turns(pl.col("hdg") + turn),
+    )
+
+
+def trajectory_rows(
+    tracks: pl.DataFrame, *, of: str | None = None
+) -> tuple[float, tuple[TrajectoryRow, ...]]:
+    """Trajectory of one road user: when it begins, and rows of seconds from then on.
+
+    Parameters
+    ----------
+    tracks
+        ``id``, ``time`` (s), ``x``, ``y`` (m) and ``hdg`` (rad) of body centres.
+    of
+        Its id in the table; not needed if there is one only.
+
+    Raises
+    ------
+    InputError
+        If there is no such road user, or it has fewer than two rows, or too many.
+    """
+    ids = tracks["id"].unique().sort().to_list()
+    if of is None and len(ids) != 1:
+        listed = ", ".join(map(str, ids[:_LISTED])) + (", ..." if len(ids) > _LISTED else "")
+        raise InputError(f"there are {len(ids)} road users: {listed}; name one")
+    if of is not None and of not in ids:
+        raise InputError(f"there is no road user {of!r}")
+    own = tracks.filter(pl.col("id") == (ids[0] if of is None else of)).sort("time")
+    if not 2 <= own.height <= _MOST_ROWS:
+        raise InputError(f"{own.height} rows; a trajectory has 2 to {_MOST_ROWS}")
+    begin = float(own["time"][0])
+    return begin, tuple(
+        (round(time - begin, 6), x, y, math.remainder(hdg, math.tau))
+        for time, x, y, hdg in own.select("time", "x", "y", "hdg").iter_rows()
     )

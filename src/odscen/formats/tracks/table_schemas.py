@@ -27,6 +27,8 @@ Types = dict[str, "pl.DataType | type[pl.DataType]"]
 
 FOOT: Final = 0.3048
 """Metres; NGSIM measures in feet."""
+_SAME = 1e-6
+"""Seconds by which a frame may miss the window and still be of it."""
 _LISTED = 12
 """Values that a message lists at most."""
 _ROLES: Final[tuple[str, ...]] = (
@@ -79,7 +81,7 @@ class TrackFile:
             table = table.filter(where)
         for expression in (*expressions, *(() if where is None else (where,))):
             self.used.update(expression.meta.root_names())
-        inside = pl.col("time").is_between(self.window.begin, self.window.end)
+        inside = pl.col("time").is_between(self.window.begin - _SAME, self.window.end + _SAME)
         return _collect_table(self.file, columns, table.select(expressions).filter(inside))
 
     def beside(self, ending: str, other: str) -> GivenFile:

@@ -82,7 +82,7 @@ def _xml_kind(root: str, content: bytes) -> FileKind:
     if root == "commonRoad":
         return FileKind(
             "a CommonRoad scenario",
-            "export its map as OpenDRIVE from CommonRoad Scenario Designer, and add that file",
+            "give it the ending .xml and add it again; its lanelets become OpenDRIVE then",
         )
     if root == "OpenSCENARIO":
         return FileKind("an OpenSCENARIO file", "a scenario is read with: odscen import FILE")

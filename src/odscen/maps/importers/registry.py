@@ -11,6 +11,7 @@ from odscen.base.errors import InputError, OdscenError
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.learning.offered_options import options_of, values_for
 from odscen.maps.importers.base import ImportedMap, ImportRecord, MapImporter
+from odscen.maps.importers.commonroad import CommonRoadImporter
 from odscen.maps.importers.file_kinds import file_kind
 from odscen.maps.importers.lanelet2.importer import Lanelet2Importer
 from odscen.maps.importers.opendrive import OpenDriveImporter
@@ -29,6 +30,7 @@ SHIPPED: tuple[type[MapImporter], ...] = (
     OpenDriveImporter,
     Lanelet2Importer,
     OpenStreetMapImporter,
+    CommonRoadImporter,
 )
 """Importers of odscen's own, in the order in which they are listed."""
 

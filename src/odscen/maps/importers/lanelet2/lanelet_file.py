@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
 
 Tags = dict[str, str]
+Relation = tuple[str, Tags, dict[str, list[tuple[str, str]]]]
+"""Id, tags, and members by role as (type, id)."""
 
 DRIVEN: Final = frozenset(
     {"road", "highway", "play_street", "exit", "bus_lane", "emergency_lane"}
@@ -159,7 +161,7 @@ def read_lanelet_file(content: bytes, *, origin: str = "") -> LaneletMap:
     nodes: dict[str, Any] = {}
     ways: dict[str, tuple[str, ...]] = {}
     way_tags: dict[str, Tags] = {}
-    relations: list[tuple[str, Tags, dict[str, list[tuple[str, str]]]]] = []
+    relations: list[Relation] = []
     for element in root:
         identity = element.get("id")
         if identity is None or element.get("action") == "delete":
@@ -190,6 +192,18 @@ def read_lanelet_file(content: bytes, *, origin: str = "") -> LaneletMap:
         found.ways[way] = tuple(
             node for k, node in enumerate(known) if k == 0 or node != known[k - 1]
         )
+    add_relations(found, relations)
+    return found
+
+
+def add_relations(found: LaneletMap, relations: Sequence[Relation]) -> None:
+    """Add what relations are to a map that has their points and ways.
+
+    Raises
+    ------
+    InputError
+        If none of them is a lanelet that can be read.
+    """
     _weld_nodes(found, relations)
     for identity, tags, members in relations:
         kind = tags.get("type", "")
@@ -204,8 +218,7 @@ def read_lanelet_file(content: bytes, *, origin: str = "") -> LaneletMap:
         else:
             found.lose("relation", identity, f"its type {shown(kind)} is none of Lanelet2")
     if not found.lanelets:
-        raise InputError("no lanelet of the file can be read", element="osm")
-    return found
+        raise InputError("no lanelet of the file can be read")
 
 
 # ----------------------------------------------------------------------------- coordinates
@@ -364,10 +377,7 @@ def _reference_of_local(local: FloatArray, degrees: FloatArray, zones: Counter[s
     return _zone_reference(zone, round(500000.0 - shift[0], 3), round(-shift[1], 3))
 
 
-def _weld_nodes(
-    found: LaneletMap,
-    relations: Sequence[tuple[str, Tags, dict[str, list[tuple[str, str]]]]],
-) -> None:
+def _weld_nodes(found: LaneletMap, relations: Sequence[Relation]) -> None:
     """Make one of end nodes of bounds that lie within a centimetre of each other."""
     from scipy.spatial import cKDTree
 

@@ -248,10 +248,11 @@ class MovedActors:
         """End the trip of a vehicle where it is."""
         self._sumo.vehicle.remove(vehicle, self._sumo.REMOVE_ARRIVED)
 
-    def insert(self, name: str, held_actor: HeldActor, speed: float | None) -> bool:
-        """Let a road user depart as soon as there is room; false if SUMO cannot.
+    def insert(self, name: str, held_actor: HeldActor, speed: float | None) -> float | None:
+        """Let a road user depart as soon as there is room; ``None`` if SUMO cannot.
 
-        A vehicle at no higher speed than SUMO takes there, see :meth:`begin_at`.
+        Gives the speed at which it departs: a vehicle at no higher one than SUMO takes there, see
+        :meth:`begin_at`; ``inf`` where SUMO chooses.
         """
         own = held_actor.attributes
         try:
@@ -260,21 +261,31 @@ class MovedActors:
                 pos = float(own["departPos"])
                 persons.add(name, held_actor.edges[0], pos, _NOW, own["type"])
                 persons.appendWalkingStage(name, list(held_actor.edges), float(own["arrivalPos"]))
-            else:
-                route, begin = f"{name} appears", own["departSpeed"]
-                if speed is not None:
-                    begin = f"{min(speed, float(own['mostSpeed'])):.4f}"
-                elif begin != "avg":
-                    begin = f"{min(float(begin), float(own['mostSpeed'])):.4f}"
-                self._sumo.route.add(route, held_actor.edges)
-                self._sumo.vehicle.add(
-                    name, route, own["type"], "now", own["departLane"], own["departPos"],
-                    begin, own["arrivalLane"], own["arrivalPos"],
-                )  # fmt: skip
-                self._sumo.vehicle.setSpeedFactor(name, float(own["speedFactor"]))
+                return math.inf
+            self._sumo.route.add(f"{name} appears", held_actor.edges)
+            if speed is None and own["departSpeed"] == "avg":
+                self._add_vehicle(name, held_actor, "avg")
+                return math.inf
         except self._errors:
-            return False
-        return True
+            return None
+        wanted = float(own["departSpeed"]) if speed is None else speed
+        # From rest where the limit is that of a turn, or only kept by its own factor, which it gets
+        # when it is there.
+        for begin in dict.fromkeys((min(wanted, float(own["mostSpeed"])), 0.0)):
+            try:
+                self._add_vehicle(name, held_actor, f"{begin:.4f}")
+            except self._errors:
+                continue
+            return begin
+        return None
+
+    def _add_vehicle(self, name: str, held_actor: HeldActor, begin: str) -> None:
+        own = held_actor.attributes
+        self._sumo.vehicle.add(
+            name, f"{name} appears", own["type"], "now", own["departLane"], own["departPos"],
+            begin, own["arrivalLane"], own["arrivalPos"],
+        )  # fmt: skip
+        self._sumo.vehicle.setSpeedFactor(name, float(own["speedFactor"]))
 
     def begin_at(self, vehicle: str, speed: float) -> None:
         """Let a vehicle that has just departed have another speed."""

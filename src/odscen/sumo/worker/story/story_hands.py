@@ -124,13 +124,14 @@ class StoryHands:
             )
             return
         self._added.add(wanted_actor.actor)
-        if not road.insert(wanted_actor.actor, held, wanted_actor.speed):
+        departs_at = road.insert(wanted_actor.actor, held, wanted_actor.speed)
+        if departs_at is None:
             self._lose_actor(wanted_actor.actor, time, "SUMO does not let it appear")
             return
         if not held.person:
             own = held.attributes
             begin = own["departSpeed"] if wanted_actor.speed is None else wanted_actor.speed
-            if begin != "avg" and float(begin) > float(own["mostSpeed"]):
+            if begin != "avg" and float(begin) > departs_at:
                 self._faster[wanted_actor.actor] = float(begin)
         if wanted_actor.at is not None:
             x, y, hdg = wanted_actor.at

@@ -10,7 +10,7 @@ import pytest
 
 from odscen.app.exchange.recorded_traffic import read_recorded_traffic
 from odscen.base.errors import InputError
-from odscen.formats.trajectories_format import trajectory_rows
+from odscen.formats.tracks.recorded_traffic import trajectory_rows
 
 CSV = "time,id,x,y\n2.5,a,10,0\n2.0,a,8,0\n3.0,a,12,0\n2.0,b,0,0\n3.0,b,0,0\n2.0,c,1,1\n"
 
