@@ -8,8 +8,9 @@ crosswalks, against the potential capacity of HCM 7th edition, chapter 20; entri
 ``roundabout`` against HCM 2010, chapter 22. Major and circulating traffic comes at random (Poisson)
 and is counted where it conflicts; the minor queue never ends. Left turns through gaps of one lane
 at the lights of ``signal_crossing``, 34 s of green in 69, against chapter 31 (critical and
-follow-up headway 4.5 and 2.5 s, two vehicles at the end of each green). Vehicles are cars with
-normal drivers, as runs have them.
+follow-up headway 4.5 and 2.5 s, two vehicles at the end of each green; oncoming queues leave with
+the saturation flow that was measured there). Vehicles are cars with normal drivers, as runs have
+them, who take gaps as in runs.
 ``ODSCEN_BENCH_STEPS`` (0.1,0.2,0.5,1) and ``ODSCEN_BENCH_SEEDS`` (1) widen or narrow it.
 """
 
@@ -33,6 +34,7 @@ from odscen.scenario.signals.webster import CRITICAL_GAP, FOLLOW_UP
 from odscen.sumo.realize.driving import draw_factor, driver
 from odscen.sumo.realize.road_user import RoadUser
 from odscen.sumo.realize.weather_effects import NO_EFFECT, WeatherEffect
+from odscen.sumo.worker.simulation.session import open_session
 
 MAPS = Path(__file__).parents[1] / "maps"
 HCM_SATURATION = 1900.0
@@ -107,12 +109,13 @@ def main() -> None:
     seeds = [int(seed) for seed in os.environ.get("ODSCEN_BENCH_SEEDS", "1").split(",")]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        _saturation_table(folder, steps, seeds)
+        crossing = _saturation_table(folder, steps, seeds)
         _turn_table(folder, steps, seeds)
-        _permissive_table(folder, steps, seeds)
+        _permissive_table(folder, steps, seeds, crossing)
 
 
-def _saturation_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
+def _saturation_table(folder: Path, steps: list[str], seeds: list[int]) -> list[float]:
+    """Print saturation flows; those of ``signal_crossing``, by step."""
     straight, crossing = folder / "straight.net.xml", folder / "crossing.net.xml"
     straight_road(straight)
     _build(MAPS / "signal_crossing.xodr", crossing)
@@ -136,6 +139,9 @@ def _saturation_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
             for s in steps
         ]
         print(f"| {name} | {' | '.join(f'{flow:.0f}' for flow in flows)} |", flush=True)
+        if name == "signal_crossing":
+            of_crossing = flows
+    return of_crossing
 
 
 def _turn_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
@@ -161,25 +167,33 @@ def _turn_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
             print(f"| {name}; {step} s | {'; '.join(cells)} |", flush=True)
 
 
-def permissive_capacity(volume: float) -> float:
-    """Left turns an hour through gaps of oncoming traffic: HCM chapter 31."""
-    arriving, leaving = volume / HOUR, HCM_SATURATION / HOUR
+def permissive_capacity(volume: float, saturation: float = HCM_SATURATION) -> float:
+    """Left turns an hour through gaps of oncoming traffic: HCM chapter 31.
+
+    Parameters
+    ----------
+    saturation
+        Vehicles an hour with which oncoming queues leave.
+    """
+    arriving, leaving = volume / HOUR, saturation / HOUR
     queue = arriving * (CYCLE - LEFT_GREEN) / (leaving - arriving)
     through = LEFT_TURN.capacity(volume)
     return (through * max(0.0, LEFT_GREEN - queue) + HOUR * SNEAKERS) / CYCLE
 
 
-def _permissive_table(folder: Path, steps: list[str], seeds: list[int]) -> None:
+def _permissive_table(
+    folder: Path, steps: list[str], seeds: list[int], saturation: list[float]
+) -> None:
     print("\n| permissive left turn at lights, veh/h, and share of HCM's; step | oncoming |")
     print("|---|---|")
     net = folder / "lights.net.xml"
     _build(MAPS / "signal_crossing.xodr", net)
-    for step in steps:
+    for step, leaving in zip(steps, saturation, strict=True):
         cells = []
         for volume in VOLUMES:
             found = [_permissive(folder, net, volume, step, seed) for seed in seeds]
             met, served, collided = (statistics.fmean(v) for v in zip(*found, strict=True))
-            share = served / permissive_capacity(met)
+            share = served / permissive_capacity(met, leaving)
             hit = f", {collided:g} collisions" if collided else ""
             cells.append(f"{met:.0f}: {served:.0f} ({share:.2f}{hit})")
         print(f"| {step} s | {'; '.join(cells)} |", flush=True)
@@ -330,7 +344,11 @@ def run_cars(
     )
     routes = folder / "routes.xml"
     routes.write_text(f'<routes><vType id="car" {attributes}/>{"".join(cars)}</routes>')
-    _tool("sumo", "-n", net, "-r", routes, "-a", folder / "extra.xml", "--end", end,
+    arguments = ["-n", net, "-r", routes, "-a", folder / "extra.xml",
           "--step-length", step, "--seed", seed, "--statistic-output", folder / "stats.xml",
           "--collision.action", "warn", "--collision.mingap-factor", "0",
-          "--collision.check-junctions", "--no-step-log", "--no-warnings")  # fmt: skip
+          "--collision.check-junctions", "--no-step-log", "--no-warnings"]  # fmt: skip
+    with open_session([str(argument) for argument in arguments]) as session:
+        while session.time < end:
+            session.turning_gaps.before_step()
+            session.step()

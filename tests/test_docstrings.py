@@ -15,7 +15,7 @@ SOURCES = Path(__file__).parents[1] / "src"
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Documented = Function | ast.ClassDef
 
-EDGE = ("app", "carla", "cli", "experiments", "web")
+EDGE = ("app", "assistants", "carla", "cli", "experiments", "web")
 """Rooms whose errors are told by who calls them: a person, or an answer of the server."""
 
 _SECTION = re.compile(r"^(?P<name>[A-Z][a-z ]+)\n-{3,}\n", re.MULTILINE)

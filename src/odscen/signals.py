@@ -2,7 +2,7 @@
 
 >>> from odscen import signals
 >>> timed = signals.time_signals(workspace, scenario, begin=0, end=900)
->>> signals.evaluate_signals(workspace, timed.scenario, today=scenario).to_words()
+>>> signals.evaluate_signals(workspace, timed.scenario, today=scenario).words
 """
 
 from odscen.app.signals.controller_logs import controller_measures, play_controller_log

@@ -113,3 +113,30 @@ def test_the_edited_scene_is_undone_timed_and_run(workspace: Path) -> None:
     assert re.search(r"^Junction .*: cycle [\d.]+ s \(was", text, re.MULTILINE)
     assert "Background traffic, Time the light" in text
     assert re.search(r"^\d+ road users, mean delay [\d.]+ s$", text, re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("map_pictures.py", r"drawn: .*segments\.svg\neastbound \S+ at \d\.\d m, westbound \S+"),
+        ("critical_gap.py", r"ttc 1\.0 s: not safe\n[^$]*ttc 5\.0 s: safe\n\d of 4 cases are"),
+        ("gate_a_change.py", r"again: 0\nnarrowed: 1 the map: width of lane .*: 3\.25 m -> 2\.4 m"),
+        ("make_dataset.py", r"^2 runs, \d{6,} bytes\n.*\.npz: \d\d arrays, \d+ road users"),
+        ("own_driver.py", r"sumo: mean speed [\d.]+ m/s\ndawdlers: mean speed [\d.]+ m/s"),
+        ("own_generator.py", r"(\d+) cars, of them \1 moving\nproblems: none"),
+        ("rain_study.py", r"as-designed: [\d.]+ m/s\nhard-rain: [\d.]+ m/s"),
+        ("to_openscenario.py", r"refused: 0\n2 actors there, 2 back"),
+        ("time_lights.py", r"junction \S+: \S+\n[^$]*[Mm]ean delay"),
+        ("drive_the_ego.py", r"0: 40 steps, return ([\d.]+)\nepisode 1: 40 steps, return \1\n"),
+    ],
+)
+def test_a_program_of_the_gallery_prints_what_it_promises(
+    name: str, words: str, tmp_path: Path
+) -> None:
+    if name == "drive_the_ego.py":
+        pytest.importorskip("gymnasium")
+    text = printed(name, tmp_path)
+    assert re.search(words, text), text
+    speeds = [float(speed) for speed in re.findall(r"([\d.]+) m/s", text)]
+    assert speeds == sorted(speeds, reverse=True)  # dawdlers and rain are slower

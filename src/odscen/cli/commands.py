@@ -63,6 +63,7 @@ _COMMANDS = {
     "diff": "difference_commands:diff_scenarios",
     "cosim": "cosim_commands:cosim",
     "serve": "serve_command:serve",
+    "assist": "assist_command:assist",
     "remove": "removal_commands:remove",
     "doctor": "doctor_command:doctor",
     "demo": "demo_command:demo",

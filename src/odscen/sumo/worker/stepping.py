@@ -66,11 +66,10 @@ class Stepper:
         self.steps = 0
         self._plan = plan
         self._diversions = Diversions(plan) if plan.measures else None
-        self._missed_lanes = MissedLanes(
-            plan.net_offset,
-            # Vehicles of a SUMO project do as they do in SUMO, until something is closed to them.
-            None if plan.closed else frozenset(a.id for a in plan.actors if not a.from_file),
-        )
+        # Vehicles of a SUMO project do as they do in SUMO, until something is closed to them.
+        own = frozenset(a.id for a in plan.actors if not a.from_file)
+        self._missed_lanes = MissedLanes(plan.net_offset, None if plan.closed else own)
+        self._take_gaps = None if len(own) == len(plan.actors) else own
         self._detours: Detours | None = None
         self._send = send
         self._watch = watch
@@ -132,6 +131,8 @@ class Stepper:
                 self._sent = clock()
                 self._report_progress(session, now, self._busy + self._sent - begin - waited)
         self._take_rules(session)
+        if saved:
+            session.turning_gaps.forget()
         self._busy += clock() - begin - waited
         self._finish_run(session, now, more=more)
         return now
@@ -152,6 +153,9 @@ class Stepper:
             self._change_routes(session, now)
         if self.behaviour is not None:
             self.behaviour.before_step(session, self._moved_by_others())
+        else:
+            gaps = session.turning_gaps
+            gaps.before_step(only=self._take_gaps, moved=self._moved_by_others())
         after = session.step()
         recorder.record(session, now)
         if self.story is not None or self._led is not None:

@@ -29,6 +29,7 @@ from odscen.sumo.worker.simulation.placed_vehicles import Placing
 from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 from odscen.sumo.worker.simulation.stop_doors import StopDoors
 from odscen.sumo.worker.simulation.stopped_vehicles import StoppedVehicles
+from odscen.sumo.worker.simulation.turning_gaps import TurningGaps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -135,6 +136,12 @@ class Session:
     def stopped(self) -> StoppedVehicles:
         """Vehicles that are stopped, and why."""
         return StoppedVehicles(self._sumo, self._errors, self.lanes)
+
+    @cached_property
+    def turning_gaps(self) -> TurningGaps:
+        """Gaps that those take who turn across oncoming traffic."""
+        native = partial(_native_function, self._sumo)
+        return TurningGaps(self._sumo, self._errors, self.lanes, native)
 
     @cached_property
     def place(self) -> Placing:

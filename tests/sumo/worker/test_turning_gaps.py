@@ -1,0 +1,101 @@
+"""In SUMO: who turns left at a light takes the gaps of oncoming traffic that people take."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from odscen.sumo.worker.simulation.session import open_session
+from tests.convert.maps import converted, named
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+LEFT, ONCOMING = "1.0.f 1.1.f 4.1.b 4.0.b", "3.0.f 3.1.f 1.1.b 1.0.b"
+CAR = '<vType id="car" length="5" width="1.8" accel="2.6" decel="4" tau="1.1" sigma="0"/>'
+BUS = '<vType id="bus" vClass="bus" length="12" width="2.5" accel="1.2" decel="4" sigma="0"/>'
+LIGHT = (
+    '<additional><tlLogic id="J10001" type="static" programID="one" offset="0">'
+    f'<phase duration="999" state="{"GGGGgrrrrrGGGGg"}{"r" * 9}"/></tlLogic></additional>'
+)
+
+
+@pytest.fixture(scope="module")
+def net(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("gaps") / "net.xml"
+    file.write_bytes(converted(named("signal_crossing")).network.net_xml)
+    return file
+
+
+def turns_between(
+    net: Path,
+    folder: Path,
+    gap: float,
+    *,
+    kinds: tuple[str, str] = ("car", "car"),
+    moved: tuple[str, ...] = (),
+    only: frozenset[str] | None = None,
+    step: str = "0.1",
+) -> bool:
+    """Whether a vehicle turns between two that come ``gap`` s apart; no two may touch.
+
+    Parameters
+    ----------
+    kinds
+        Of the one that turns, and of those that come.
+    """
+    departs = [(18.5, "turns", LEFT, 2, kinds[0])]
+    departs += [(20.0 + late, name, ONCOMING, 1, kinds[1]) for name, late in (("a", 0), ("b", gap))]
+    routes, lights = folder / "routes.xml", folder / "lights.xml"
+    lights.write_text(LIGHT)
+    routes.write_text(
+        f"<routes>{CAR}{BUS}"
+        + "".join(
+            f'<vehicle id="{name}" type="{kind}" depart="{depart}" departLane="{lane}"'
+            f' departSpeed="max" speedFactor="1"><route edges="{edges}"/></vehicle>'
+            for depart, name, edges, lane, kind in sorted(departs)
+        )
+        + "</routes>"
+    )
+    order: list[str] = []
+    with open_session(
+        ["-n", str(net), "-r", str(routes), "-a", str(lights), "--step-length", step,
+         "--no-step-log", "--collision.action", "warn", "--collision.check-junctions",
+         "--collision.mingap-factor", "0"]
+    ) as session:  # fmt: skip
+        while session.time < 120.0 and session.expected():
+            session.turning_gaps.before_step(only=only, moved=moved)
+            session.step()
+            happened = session.happened()
+            assert happened is None or not happened.collisions
+            for name in session.vehicles():
+                ((lane, _),) = session.vehicle_places([name])
+                if lane in ("4.1.b_1", "1.1.b_1") and name not in order:
+                    order.append(name)
+    assert sorted(order) == ["a", "b", "turns"]
+    assert order[0] == "a"
+    return order == ["a", "turns", "b"]
+
+
+def test_a_gap_is_taken_from_some_six_seconds_on(net: Path, tmp_path: Path) -> None:
+    """SUMO alone lets nobody in below 12 s here, as paths cross 27 m behind the stop line."""
+    taken = {gap: turns_between(net, tmp_path, gap) for gap in (3.0, 4.5, 7.0, 9.0)}
+    assert taken == {3.0: False, 4.5: False, 7.0: True, 9.0: True}
+    nobody = frozenset[str]()
+    alone = [turns_between(net, tmp_path, gap, only=nobody) for gap in (7.0, 11.0, 14.0)]
+    assert alone == [False, False, True]
+    assert not turns_between(net, tmp_path, 7.0, moved=("turns",))
+
+
+@pytest.mark.parametrize("step", ["0.5", "1"])
+def test_no_two_touch_whatever_the_gap(net: Path, tmp_path: Path, step: str) -> None:
+    for gap in range(2, 14):
+        turns_between(net, tmp_path, float(gap), step=step)
+        turns_between(net, tmp_path, float(gap), kinds=("car", "bus"), step=step)
+
+
+def test_a_bus_that_turns_waits_as_sumo_has_it(net: Path, tmp_path: Path) -> None:
+    """Its sides leave its path in a turn, and it is long."""
+    assert not turns_between(net, tmp_path, 9.0, kinds=("bus", "car"))
+    assert turns_between(net, tmp_path, 15.0, kinds=("bus", "car"))
