@@ -41,7 +41,7 @@ def test_a_study_is_begun_by_mouse_and_its_means_are_those_of_the_table(
         "1 scenario × 2 variants × 3 seeds: all runs completed.", timeout=120_000
     )
     page.get_by_role("textbox", name="Figure").click()
-    page.get_by_role("option", name="mean speed, m/s").click()
+    page.get_by_role("option", name="mean speed, km/h").click()
     means = page.get_by_role("table", name="Means")
     found = pl.read_parquet(Workspace.open(served.workspace).studies / "rain" / "results.parquet")
     assert found.height == 6
@@ -49,7 +49,7 @@ def test_a_study_is_begun_by_mouse_and_its_means_are_those_of_the_table(
     assert isinstance(designed, float)
     text = row(means, "as designed").inner_text()
     shown = float(text.split("\t")[-1].split("±")[0])
-    assert shown == pytest.approx(designed, rel=0.05)
+    assert shown == pytest.approx(3.6 * designed, rel=0.05)
     expect(page.get_by_role("table", name="Differences").get_by_role("row")).to_have_count(2)
     page.get_by_role("link", name="All studies").click()
     listed = page.get_by_role("table", name="Studies").get_by_role("row").last

@@ -4988,11 +4988,13 @@ export interface components {
             /** @default [] */
             cordons: components["schemas"]["Cordon"][];
         };
-        /** @description A figure that runs of a study have. */
+        /** @description A figure that runs of a study have; ``better`` says which of two values is. */
         StudyFigure: {
             name: string;
             label: string;
             unit: string;
+            /** @default neither */
+            better: components["schemas"]["Better"];
         };
         /**
          * @description A study: what it runs, and how far it is.
@@ -5021,12 +5023,18 @@ export interface components {
             words: string;
             runs: number;
         };
-        /** @description One figure of a study, of all runs that have completed by now. */
+        /**
+         * @description One figure of a study, of all runs that have completed by now.
+         *
+         *     ``differences`` are those of variants from the first one, ``between`` those of scenarios from
+         *     the first one, both of runs with the same seed.
+         */
         StudyResults: {
             figures: components["schemas"]["StudyFigure"][];
             figure: string;
             groups: components["schemas"]["FigureGroup"][];
             differences: components["schemas"]["FigureGroup"][];
+            between: components["schemas"]["FigureGroup"][];
         };
         /**
          * @description Scenarios as they are now, each with every weather and every seed.

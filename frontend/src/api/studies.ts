@@ -8,6 +8,7 @@ export type StudyInfo = Schemas["StudyInfo"];
 export type StudyWish = Schemas["StudyWish"];
 /** One figure of a study. */
 export type StudyResults = Schemas["StudyResults"];
+export type StudyFigure = Schemas["StudyFigure"];
 /** A figure over the runs of a scenario and variant. */
 export type FigureGroup = Schemas["FigureGroup"];
 

@@ -11,6 +11,7 @@ import { isXosc } from "../exchange/useImport";
 import { IconHelp, IconMenu, IconPlay, IconRedo, IconSearch, IconTour, IconUndo } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
 import { go } from "../ui/address";
+import { CompareDialog } from "./CompareDialog";
 import { ExportMenu } from "./ExportMenu";
 import { NameDialog, OpenDialog } from "./fileDialogs";
 import type { EditorStore } from "./store";
@@ -21,7 +22,7 @@ const SAVED = localized(
 );
 const named = (label: unknown): string => (typeof label === "string" && label ? `: ${label}` : "");
 
-type Dialog = "rename" | "copy" | "open" | null;
+type Dialog = "rename" | "copy" | "open" | "compare" | null;
 
 /** Undo, redo, autosave and files, in the head of the page. */
 export const HeadTools = memo(function HeadTools({
@@ -141,6 +142,9 @@ export const HeadTools = memo(function HeadTools({
           <Menu.Item onClick={() => file.current?.click()}>
             <Trans>Upload a file …</Trans>
           </Menu.Item>
+          <Menu.Item onClick={() => setDialog("compare")}>
+            <Trans>Compare with …</Trans>
+          </Menu.Item>
           <Menu.Item onClick={() => go({ view: "runs", scenario: name })}>
             <Trans>Earlier runs</Trans>
           </Menu.Item>
@@ -211,6 +215,7 @@ export const HeadTools = memo(function HeadTools({
           }}
         />
       )}
+      {dialog === "compare" && <CompareDialog scenario={name} onClose={close} />}
       {dialog === "open" && <OpenDialog current={name} onClose={close} />}
     </>,
     slot,

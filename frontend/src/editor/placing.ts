@@ -64,7 +64,7 @@ interface Fit {
   without?: ReadonlySet<string>;
 }
 
-const NOBODY: ReadonlySet<string> = new Set<string>();
+const NO_ACTORS: ReadonlySet<string> = new Set<string>();
 /** No vehicle is longer, metres. */
 const LONGEST = 20;
 
@@ -100,7 +100,7 @@ export class Starts {
     y: number,
     reach: number,
     walk: boolean,
-    { besides, size, others = [], without = NOBODY }: Fit = {},
+    { besides, size, others = [], without = NO_ACTORS }: Fit = {},
   ): Place | null {
     const wide = Math.max(3 * reach, SNAP);
     const beside = size ? [...this.bodiesNear(x, y, wide + LONGEST, without), ...others] : [];

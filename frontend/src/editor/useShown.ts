@@ -13,7 +13,7 @@ export interface Shown {
   flows: SceneFlow[];
 }
 
-const NOBODY: ReadonlySet<string> = new Set<string>();
+const NO_ACTORS: ReadonlySet<string> = new Set<string>();
 
 /** What the map shows of a document; each part is made anew only when its own cause changes. */
 export function useShown(
@@ -26,7 +26,7 @@ export function useShown(
   const { roi, actors: placed, flows: sent } = document;
   const inside = useMemo(() => insideRows(graph, roi), [graph, roi]);
   const starts = useMemo(() => {
-    const bodies = sceneActors(graph, { actors: placed }, assets, NOBODY, NOBODY);
+    const bodies = sceneActors(graph, { actors: placed }, assets, NO_ACTORS, NO_ACTORS);
     const vehicles = bodies.filter(({ category }) => category !== "pedestrian");
     const known = new Map(vehicles.map((body) => [body.id, body]));
     return new Starts(graph, picker, inside, { actors: placed, flows: sent }, known);

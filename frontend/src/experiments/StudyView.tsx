@@ -9,7 +9,7 @@ import { go, hashOf } from "../ui/address";
 import { tellError } from "../ui/notices";
 import { ExperimentHead } from "./ExperimentHead";
 import { FigurePlot } from "./FigurePlot";
-import { matters, meanWord, outcomeWord, variantWord } from "./groups";
+import { differenceWords, inReadersUnits, matters, meanWord, outcomeWord, variantWord } from "./groups";
 import { useStudy } from "./useStudy";
 import "./experiments.css";
 
@@ -29,7 +29,7 @@ export function StudyView({ study }: { study: string }) {
       {!info && !error && <Loader aria-label={t`Loading the study`} />}
       {info && <Head info={info} onChanged={reload} />}
       {info && info.problems.length > 0 && <Problems info={info} onChanged={reload} />}
-      {results && <Figures results={results} onChoose={choose} />}
+      {results && <Figures results={inReadersUnits(results)} onChoose={choose} />}
     </div>
   );
 }
@@ -118,6 +118,8 @@ function Problems({ info, onChanged }: { info: StudyInfo; onChanged: () => void 
 
 /** The figure that is chosen: as a picture, as means, and as differences between variants. */
 function Figures({ results, onChoose }: { results: StudyResults; onChoose: (figure: string) => void }) {
+  const figure = results.figures.find(({ name }) => name === results.figure);
+  const first = results.groups[0]?.scenario ?? "";
   return (
     <>
       <Select
@@ -135,11 +137,32 @@ function Figures({ results, onChoose }: { results: StudyResults; onChoose: (figu
           if (next !== null) onChoose(next);
         }}
       />
+      {figure && results.between.length > 0 && (
+        <ul className="study-sentences" aria-label={t`In a sentence`}>
+          {results.between.map((one) => (
+            <li key={`${one.scenario}/${one.variant}`}>
+              {differenceWords(figure, one, first)}
+              {results.differences.length > 0 && ` ${variantWord(one.variant)}`}
+            </li>
+          ))}
+        </ul>
+      )}
       <FigurePlot results={results} />
       <Title order={2} size="h4" mt="lg" mb="xs">
         <Trans>Means</Trans>
       </Title>
       <GroupTable groups={results.groups} label={t`Means`} />
+      {results.between.length > 0 && (
+        <>
+          <Title order={2} size="h4" mt="lg" mb="xs">
+            <Trans>Differences from {first}</Trans>
+          </Title>
+          <Text size="sm" mb="xs">
+            <Trans>Between runs of the same seed, so that what they share does not count.</Trans>
+          </Text>
+          <GroupTable groups={results.between} label={t`Differences between scenarios`} judged />
+        </>
+      )}
       {results.differences.length > 0 && (
         <>
           <Title order={2} size="h4" mt="lg" mb="xs">
@@ -179,7 +202,7 @@ function GroupTable({ groups, label, judged }: { groups: FigureGroup[]; label: s
             </Table.Th>
             {judged && (
               <Table.Th>
-                <Trans>More than chance</Trans>
+                <Trans>Clear difference</Trans>
               </Table.Th>
             )}
           </Table.Tr>

@@ -1,7 +1,10 @@
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 
-import type { FigureGroup, StudyInfo } from "../api/studies";
+import { served } from "../language/served";
+import { shownUnit } from "../language/units";
+import type { FigureGroup, StudyFigure, StudyInfo, StudyResults } from "../api/studies";
+import { sentence } from "../ui/words";
 
 /** What the command line and the files call a scenario without edits. */
 const AS_DESIGNED = "as-designed";
@@ -36,4 +39,44 @@ export function outcomeWord({ state, runs, ended, completed }: StudyInfo): strin
   return completed === runs
     ? t`all runs completed`
     : t`${(runs - completed).toLocaleString(i18n.locale)} of ${runs.toLocaleString(i18n.locale)} runs failed`;
+}
+
+/** Results in the units of the reader. */
+export function inReadersUnits(results: StudyResults): StudyResults {
+  const unit = results.figures.find(({ name }) => name === results.figure)?.unit ?? "";
+  const { shown } = shownUnit(unit);
+  const maybe = (value: number | null): number | null => (value === null ? null : shown(value));
+  const group = (one: FigureGroup): FigureGroup => ({
+    ...one,
+    mean: maybe(one.mean),
+    half_width: maybe(one.half_width),
+    values: one.values.map(shown),
+  });
+  return {
+    ...results,
+    figures: results.figures.map((one) => ({ ...one, unit: shownUnit(one.unit).sign })),
+    groups: results.groups.map(group),
+    differences: results.differences.map(group),
+    between: results.between.map(group),
+  };
+}
+
+/** What a difference from the first scenario means, in one sentence. */
+export function differenceWords(figure: StudyFigure, one: FigureGroup, first: string): string {
+  const label = sentence(served(figure.label));
+  const unit = figure.unit ? ` ${figure.unit}` : "";
+  const { mean, half_width: half, scenario } = one;
+  if (mean === null || half === null)
+    return t`${label}: two runs of each are needed to compare ${scenario} with ${first}.`;
+  const [low, high] = [mean - half, mean + half];
+  if (!matters(one))
+    return t`${label}: no clear difference between ${scenario} and ${first} (${rounded(low, half)} to ${rounded(high, half)}${unit}).`;
+  const [least, most] = mean > 0 ? [low, high] : [-high, -low];
+  const by = `${rounded(Math.abs(mean), half)}${unit} (${rounded(least, half)} to ${rounded(most, half)})`;
+  const change =
+    mean > 0
+      ? t`${label} rises by ${by} in ${scenario}, compared with ${first}`
+      : t`${label} falls by ${by} in ${scenario}, compared with ${first}`;
+  if (figure.better === "neither") return `${change}.`;
+  return mean > 0 === (figure.better === "higher") ? t`${change}: better.` : t`${change}: worse.`;
 }

@@ -1,7 +1,14 @@
 import { expect, test } from "vitest";
 
 import type { FigureGroup, StudyInfo } from "../../src/api/studies";
-import { matters, meanWord, outcomeWord, rounded } from "../../src/experiments/groups";
+import {
+  differenceWords,
+  inReadersUnits,
+  matters,
+  meanWord,
+  outcomeWord,
+  rounded,
+} from "../../src/experiments/groups";
 
 const GROUP: FigureGroup = {
   scenario: "a",
@@ -34,4 +41,33 @@ test("a study says how far it is", () => {
   expect(outcomeWord({ ...info, state: "done", ended: 2000, completed: 1998 })).toBe(
     "2 of 2,000 runs failed",
   );
+});
+
+const SPEED = { name: "mean_speed", label: "mean speed", unit: "m/s", better: "higher" as const };
+const DELAY = { name: "mean_delay", label: "mean delay", unit: "s", better: "lower" as const };
+
+test("a comparison of two scenarios is one sentence, with its interval and what is better", () => {
+  const after = { ...GROUP, scenario: "after", mean: -12, half_width: 4 };
+  expect(differenceWords(DELAY, after, "before")).toBe(
+    "Mean delay falls by 12.0 s (8.0 to 16.0) in after, compared with before: better.",
+  );
+  expect(differenceWords(DELAY, { ...after, mean: 3, half_width: 1 }, "before")).toBe(
+    "Mean delay rises by 3.0 s (2.0 to 4.0) in after, compared with before: worse.",
+  );
+  expect(differenceWords(DELAY, { ...after, mean: 1.1, half_width: 3 }, "before")).toBe(
+    "Mean delay: no clear difference between after and before (−1.9 to 4.1 s).",
+  );
+  expect(differenceWords(DELAY, { ...after, mean: null, half_width: null }, "before")).toBe(
+    "Mean delay: two runs of each are needed to compare after with before.",
+  );
+});
+
+test("speeds of studies are in the unit of the reader, differences as well", () => {
+  const results = { figures: [SPEED], figure: "mean_speed", groups: [GROUP], differences: [], between: [] };
+  const after = { ...GROUP, mean: -1, half_width: 0.5, values: [-1, -1.5] };
+  const shown = inReadersUnits({ ...results, between: [after] });
+  expect(shown.figures[0]?.unit).toBe("km/h");
+  expect(shown.groups[0]?.mean).toBeCloseTo(44.44, 2);
+  expect([shown.between[0]?.mean, shown.between[0]?.half_width]).toEqual([-3.6, 1.8]);
+  expect(shown.between[0]?.values).toEqual([-3.6, -5.4]);
 });

@@ -34,6 +34,8 @@ MOST_ROWS: Final = 500
 """Of a table on the page; the Parquet file has all."""
 _SHARE: Final = 0.05
 _KEYS: Final = ["scenario", "case", "seed"]
+_SHARED: Final = ["variant", "seed"]
+"""What runs of two scenarios share that are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,12 +147,47 @@ def paired_differences(table: pl.DataFrame, figures: Sequence[str]) -> list[Stud
     variants = table["variant"].unique(maintain_order=True).to_list()
     if len(variants) < 2:
         return []
-    first = table.filter(pl.col("variant") == variants[0]).select(*_KEYS, *figures)
-    both = table.filter(pl.col("variant") != variants[0]).join(
-        first, on=_KEYS, suffix=" before", nulls_equal=True, maintain_order="left"
+    first = table.filter(pl.col("variant") == variants[0])
+    others = table.filter(pl.col("variant") != variants[0])
+    return _group_figures(_paired(others, first, _KEYS, figures), figures, differences=True)
+
+
+def _paired(
+    table: pl.DataFrame, first: pl.DataFrame, keys: Sequence[str], figures: Sequence[str]
+) -> pl.DataFrame:
+    """Return ``table`` with its differences from the rows of ``first`` that have the same keys."""
+    import polars as pl
+
+    both = table.join(
+        first.select(*keys, *figures),
+        on=list(keys),
+        suffix=" before",
+        nulls_equal=True,
+        maintain_order="left",
     )
-    differences = [pl.col(name) - pl.col(f"{name} before") for name in figures]
-    return _group_figures(both.with_columns(differences), figures, differences=True)
+    return both.with_columns(pl.col(name) - pl.col(f"{name} before") for name in figures)
+
+
+def scenario_differences(out: Path, figures: Sequence[str]) -> list[StudyGroup]:
+    """By how much scenarios differ from the first one, run by run of the same variant and seed.
+
+    None where a scenario has several cases, of which no two belong together.
+
+    Raises
+    ------
+    InputError
+        If there is no study, or no such figure.
+    """
+    import polars as pl
+
+    _refuse_unknown(figures)
+    own = _completed_rows(study_results(out).table)
+    scenarios = own["scenario"].unique(maintain_order=True).to_list()
+    if len(scenarios) < 2 or own.select("scenario", *_SHARED).is_duplicated().any():
+        return []
+    first = own.filter(pl.col("scenario") == scenarios[0])
+    others = own.filter(pl.col("scenario") != scenarios[0])
+    return _group_figures(_paired(others, first, _SHARED, figures), figures, differences=True)
 
 
 def write_study_page(out: Path, figures: Sequence[str], file: Path) -> Path:

@@ -56,7 +56,9 @@ def test_scenarios_run_with_every_weather_and_seed(
     table = pl.read_parquet(workspace.studies / done["study"] / "results.parquet")
     assert [v for one in found["groups"] for v in one["values"]] == table["mean_speed"].to_list()
     assert found["differences"][0]["mean"] == difference.figures["mean_speed"].mean
-    assert {"name": "mean_speed", "label": "mean speed", "unit": "m/s"} in found["figures"]
+    speed = {"name": "mean_speed", "label": "mean speed", "unit": "m/s", "better": "higher"}
+    assert speed in found["figures"]
+    assert found["between"] == []
 
     page = client.get(f"{path}/files/study.html")
     assert "All runs completed" in page.text
@@ -69,6 +71,36 @@ def test_scenarios_run_with_every_weather_and_seed(
     assert (again.status_code, client.post(f"{path}/stop").status_code) == (409, 409)
     assert client.delete(path).status_code == 204
     assert client.get(path).status_code == 404
+
+
+@pytest.mark.slow
+def test_two_scenarios_are_compared_run_by_run_of_the_same_seed(
+    client: TestClient, workspace: Workspace, sampled: str
+) -> None:
+    other = client.post(f"/api/scenarios/{sampled}/copy", json={"name": "slower"}).json()
+    edits = [
+        {"kind": "change_actor", "actor": one["id"], "speed": 4.0}
+        for one in other["document"]["actors"]
+        if one["category"] != "pedestrian"
+    ]
+    wish = {"version": other["version"], "edits": edits}
+    assert client.post("/api/scenarios/slower/edits", json=wish).status_code == 200
+    study = asked(client, "", {"scenarios": [sampled, "slower"], "seeds": 3, "until": 20})["study"]
+    ended(client, study)
+    path = f"/api/studies/{study}/results"
+    (found,) = client.get(path, params={"figure": "mean_speed"}).json()["between"]
+    table = pl.read_parquet(workspace.studies / study / "results.parquet")
+    of = {
+        name: part.sort("seed")["mean_speed"]
+        for (name,), part in table.group_by("scenario", maintain_order=True)
+    }
+    differences = of["slower"] - of[sampled]
+    assert found["scenario"] == "slower"
+    assert found["values"] == pytest.approx(differences.to_list())
+    assert found["mean"] == pytest.approx(differences.mean())
+    # Student's t of two degrees of freedom, 95 %.
+    assert found["half_width"] == pytest.approx(4.3027 * differences.std() / 3**0.5, rel=1e-4)
+    assert found["mean"] + found["half_width"] < 0
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from odscen.figures.measures.figure import Better
 from odscen.web.messages import Answer, Name, RequestBody
 
 MOST_PAGE_RUNS = 10_000
@@ -66,11 +67,12 @@ class StudyInfo(Answer):
 
 
 class StudyFigure(Answer):
-    """A figure that runs of a study have."""
+    """A figure that runs of a study have; ``better`` says which of two values is."""
 
     name: str
     label: str
     unit: str
+    better: Better = Better.NEITHER
 
 
 class FigureGroup(Answer):
@@ -89,9 +91,14 @@ class FigureGroup(Answer):
 
 
 class StudyResults(Answer):
-    """One figure of a study, of all runs that have completed by now."""
+    """One figure of a study, of all runs that have completed by now.
+
+    ``differences`` are those of variants from the first one, ``between`` those of scenarios from
+    the first one, both of runs with the same seed.
+    """
 
     figures: list[StudyFigure]
     figure: str
     groups: list[FigureGroup]
     differences: list[FigureGroup]
+    between: list[FigureGroup]

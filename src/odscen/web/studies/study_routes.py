@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter
 from starlette.responses import FileResponse, Response
 
-from odscen.experiments.study_page import SHOWN_FIGURES, figures_had, study_groups
+from odscen.experiments.study_page import (
+    SHOWN_FIGURES,
+    figures_had,
+    scenario_differences,
+    study_groups,
+)
 from odscen.figures.measures.registry import run_figure
 from odscen.web.services import Shared
 from odscen.web.studies.study_messages import (
@@ -82,6 +87,7 @@ def results(study: str, shared: Shared, figure: str | None = None) -> StudyResul
         figure=shown,
         groups=_figure_groups(groups, shown),
         differences=_figure_groups(differences, shown),
+        between=_figure_groups(scenario_differences(folder, [shown]), shown),
     )
 
 
@@ -99,7 +105,7 @@ def _figure_info(name: str) -> StudyFigure:
     found = run_figure(name)
     if found is None:
         return StudyFigure(name=name, label=name, unit="")
-    return StudyFigure(name=name, label=found.label, unit=found.unit)
+    return StudyFigure(name=name, label=found.label, unit=found.unit, better=found.better)
 
 
 def _figure_groups(groups: Sequence[StudyGroup], figure: str) -> list[FigureGroup]:
