@@ -102,7 +102,7 @@ def first_lines(store, file):
             r'<speed max="50"',
             '<speed max="20"',
             "failure",
-            r"the map: limit of road 3, s 0 to 130 m: 50 km/h -> 20 km/h: .*mean_travel_time is .*"
+            r"the map: limit of road 3, s 0 to 130 m: 50 km/h -> 20 km/h: .*travel_time is .*"
             r"most at segment r3: free_speed is",
             id="the limit of one road",
         ),
