@@ -100,7 +100,9 @@ def _one(file: Path, maps: Path, folder: Path, ego: EgoDriver) -> None:
     """Import and run one file in this process, and print what became of it."""
     workspace = Workspace.open(folder / "workspace")
     try:
-        found = import_file(workspace, file, maps=maps if maps.is_dir() else None, ego=ego)
+        found = import_file(
+            workspace, file, maps=maps if maps.is_dir() else None, options={"ego": ego}
+        )
     except NoMapError as error:
         counts = {one: len(error.lists[one]) for one in VERDICTS}
         print(json.dumps({"run": "no map", "report": counts}))
