@@ -138,7 +138,7 @@ def gate(
         print_json(to_dict(result))
     _show_result(result, as_json=as_json)
     if annotations is not None:
-        _annotate(result, annotations, as_json=as_json)
+        _print_annotations(result, annotations, as_json=as_json)
     raise typer.Exit(result.exit_code)
 
 
@@ -184,7 +184,7 @@ def _show_result(result: SuiteResult, *, as_json: bool) -> None:
             log(f"{case.name}: {line}")
 
 
-def _annotate(result: SuiteResult, form: Annotations, *, as_json: bool) -> None:
+def _print_annotations(result: SuiteResult, form: Annotations, *, as_json: bool) -> None:
     from odscen.base.text_files import write_text
     from odscen.experiments.annotations import (
         CODE_QUALITY_FILE,

@@ -149,10 +149,10 @@ def paired_differences(table: pl.DataFrame, figures: Sequence[str]) -> list[Stud
         return []
     first = table.filter(pl.col("variant") == variants[0])
     others = table.filter(pl.col("variant") != variants[0])
-    return _group_figures(_paired(others, first, _KEYS, figures), figures, differences=True)
+    return _group_figures(_format_paired(others, first, _KEYS, figures), figures, differences=True)
 
 
-def _paired(
+def _format_paired(
     table: pl.DataFrame, first: pl.DataFrame, keys: Sequence[str], figures: Sequence[str]
 ) -> pl.DataFrame:
     """Return ``table`` with its differences from the rows of ``first`` that have the same keys."""
@@ -187,7 +187,9 @@ def scenario_differences(out: Path, figures: Sequence[str]) -> list[StudyGroup]:
         return []
     first = own.filter(pl.col("scenario") == scenarios[0])
     others = own.filter(pl.col("scenario") != scenarios[0])
-    return _group_figures(_paired(others, first, _SHARED, figures), figures, differences=True)
+    return _group_figures(
+        _format_paired(others, first, _SHARED, figures), figures, differences=True
+    )
 
 
 def write_study_page(out: Path, figures: Sequence[str], file: Path) -> Path:

@@ -94,7 +94,7 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
             (
                 _encode_version(),
                 _encode_time(time),
-                _identifier(3, ego) if ego in present else b"",
+                _encode_identifier(3, ego) if ego in present else b"",
                 objects,
                 *(shown[color] for shown, color in zip(lights, colors, strict=True)),
                 of_map,
@@ -170,7 +170,7 @@ def _body_of(source: ExportSource, user: PlannedActor, number: int) -> _Body:
     if not walks:
         behind += message(6, whole(1, _VEHICLES.get(str(user.category), _OTHER_VEHICLE)))
     size = (user.length, user.width, body_height(source, user))
-    return _Body(number, _identifier(1, number), size, behind)
+    return _Body(number, _encode_identifier(1, number), size, behind)
 
 
 def _encode_instants(
@@ -226,7 +226,7 @@ def _encode_lights(
                 )
                 mode = _LIT if color == bulb + 1 else _DARK
                 classification = whole(1, kind) + whole(2, _NO_ICON) + whole(3, mode)
-                one = _identifier(1, _FIRST_BULB + 3 * row + bulb) + message(2, base)
+                one = _encode_identifier(1, _FIRST_BULB + 3 * row + bulb) + message(2, base)
                 content += message(7, one + message(3, classification))
             shown.append(content)
         found.append((shown[0], shown[1], shown[2], shown[3]))
@@ -259,7 +259,7 @@ def _encode_time(time: float) -> bytes:
     return message(2, whole(1, seconds) + whole(2, nanos))
 
 
-def _identifier(field: int, number: int) -> bytes:
+def _encode_identifier(field: int, number: int) -> bytes:
     from odscen.formats.recordings.protobuf_wire import message, whole
 
     return message(field, whole(1, number))

@@ -328,7 +328,7 @@ class EditedMap:
         sections[key.section] = replace(section, lanes={**section.lanes, key.lane: lane})
         self._replace_road(replace(road, sections=tuple(sections)), shape=shape)
 
-    def _lane(self, key: LaneKey) -> model.Lane:
+    def _lane_model(self, key: LaneKey) -> model.Lane:
         return self.map.roads[key.road].sections[key.section].lanes[key.lane]
 
     def _new_id(self) -> str:
@@ -349,7 +349,7 @@ class EditedMap:
             and model.lane_use(other) in model.DRIVABLE_TYPES
         )
 
-    def _edges(self, lane: FoundLane, ids: Iterable[int]) -> tuple[float, float]:
+    def _lane_edges(self, lane: FoundLane, ids: Iterable[int]) -> tuple[float, float]:
         """Least and largest t of lanes of the section at the place."""
         index = self.table.lane_index
         rows = np.array([index[lane.key._replace(lane=number)] for number in ids])
@@ -364,7 +364,7 @@ class EditedMap:
         EditRefusedError
             If its lanes are given by borders.
         """
-        lane, road = self._lane(found.key), self.map.roads[found.key.road]
+        lane, road = self._lane_model(found.key), self.map.roads[found.key.road]
         section = road.sections[found.key.section]
         if any(other.borders and not other.widths for other in section.lanes.values()):
             raise EditRefusedError("its lanes are given by borders, not by widths")
@@ -432,14 +432,14 @@ class EditedMap:
         for number in ids:
             key = found.key._replace(lane=number)
             limits = (model.LaneSpeed(section.s, speed),)
-            self._replace_lane(key, replace(self._lane(key), speeds=limits), shape=True)
+            self._replace_lane(key, replace(self._lane_model(key), speeds=limits), shape=True)
         return _lane_path(found.key), f"{lanes}: limit {speed * 3.6:g} km/h"
 
     def set_access(
         self, found: FoundLane, kind: str | None, allow: Sequence[str], deny: Sequence[str]
     ) -> Done:
         """Give a lane a type, and access rules in place of those that it has."""
-        lane = self._lane(found.key)
+        lane = self._lane_model(found.key)
         start = self.map.roads[found.key.road].sections[found.key.section].s
         rules = [("allow", name) for name in allow] + [("deny", name) for name in deny]
         access = tuple(model.LaneAccess(start, rule, name) for rule, name in rules)
@@ -472,7 +472,7 @@ class EditedMap:
         if not borders:
             raise EditRefusedError(f"there is no lane border at x {xy[0]:.1f} m, y {xy[1]:.1f} m")
         key = min(borders, key=lambda border: (round(border[0], 6), border[1]))[1]
-        lane = self._lane(key)
+        lane = self._lane_model(key)
         start = self.map.roads[key.road].sections[key.section].s
         solid = mark.startswith("solid") or mark == "curb"
         change = lane_change or ("none" if solid else "both")
@@ -514,14 +514,14 @@ class EditedMap:
         ids = self._same_way(found)
         if not ids:
             raise EditRefusedError("there is no lane for motor vehicles in this direction")
-        low, high = self._edges(found, ids)
+        low, high = self._lane_edges(found, ids)
         element = self._add_object(
             found.key.road, "roadMark", "StopLine", found.s, (low + high) / 2.0,
-            length=_STOP_LINE, width=high - low, orientation=self._orientation(found),
+            length=_STOP_LINE, width=high - low, orientation=self._find_facing(found),
         )  # fmt: skip
         return element, f"stop line of {high - low:.1f} m at s {found.s:.1f} m"
 
-    def _orientation(self, found: FoundLane) -> str:
+    def _find_facing(self, found: FoundLane) -> str:
         return "+" if self.table.lane_forward[found.row] else "-"
 
     def add_crosswalk(self, found: FoundLane, width: float) -> Done:
@@ -540,7 +540,7 @@ class EditedMap:
             raise EditRefusedError("there is no carriageway to cross")
         if not width / 2.0 <= found.s <= road.length - width / 2.0:
             raise EditRefusedError(f"its road ends within {width / 2.0:g} m")
-        low, high = self._edges(found, ids)
+        low, high = self._lane_edges(found, ids)
         low, high = low - 0.5, high + 0.5  # on to the sidewalks, where pedestrians come from
         element = self._add_object(
             road.id, "crosswalk", "Crosswalk", found.s, (low + high) / 2.0,
@@ -601,13 +601,13 @@ class EditedMap:
         if not ids:
             raise EditRefusedError("there is no lane for motor vehicles in this direction")
         road = self.map.roads[found.key.road]
-        low, high = self._edges(found, ids)
+        low, high = self._lane_edges(found, ids)
         side = math.copysign(1.0, found.key.lane)
         factor = {"km/h": 1.0 / 3.6, "mph": 0.44704}.get(unit)
         signal = model.Signal(
             id=self._new_id(), name="Light" if light else "Sign", s=found.s,
             t=high + _STANDING if side > 0 else low - _STANDING,
-            z_offset=3.0 if light else 2.0, h_offset=0.0, orientation=self._orientation(found),
+            z_offset=3.0 if light else 2.0, h_offset=0.0, orientation=self._find_facing(found),
             dynamic=light, country=country, type=kind, subtype=subtype,
             value=value if value is None or factor is None else value * factor,
             unit=unit if factor is None else "m/s", text="", width=0.4 if light else 0.6,
@@ -711,7 +711,9 @@ class EditedMap:
             if not any(connection.connecting_road == key.road for connection in kept):
                 self._remove_road(key.road)
             else:
-                lane = replace(self._lane(key), type="restricted", predecessors=(), successors=())
+                lane = replace(
+                    self._lane_model(key), type="restricted", predecessors=(), successors=()
+                )
                 self._replace_lane(key, lane, shape=True)
         self.map.junctions[number] = junction
         return (
@@ -752,9 +754,9 @@ class EditedMap:
         road_id = RoadId(self._new_road_id())
         lane = model.Lane(
             own,
-            self._lane(start.key).type,
+            self._lane_model(start.key).type,
             widths=tuple(ease(0.0, w0, w1, curve.length)[:1]),
-            access=tuple(rule._replace(s=0.0) for rule in self._lane(start.key).access),
+            access=tuple(rule._replace(s=0.0) for rule in self._lane_model(start.key).access),
             predecessors=(start.key.lane,),
             successors=(end.key.lane,),
         )

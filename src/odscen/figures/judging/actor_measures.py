@@ -151,7 +151,9 @@ def _top_speed(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
     return Measured(float(row["speed"]), float(row["time"]))
 
 
-def _impacts(name: str, *, first: bool) -> Callable[[RunRecords, ActorOutcome], Measured | None]:
+def _measure_impacts(
+    name: str, *, first: bool
+) -> Callable[[RunRecords, ActorOutcome], Measured | None]:
     """The first or the largest value of an actor's collisions; without any 0, or nothing."""
 
     def found(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
@@ -394,7 +396,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="Highest speed of the actor and whom it collided with to each other; 0 without.",
         source="events",
         better=Better.LOWER,
-        compute=_impacts("impact_speed", first=False),
+        compute=_measure_impacts("impact_speed", first=False),
     ),
     ActorMeasure(
         name="impact_overlap",
@@ -402,7 +404,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         label="overlap at impact",
         definition="Share of the width of who hits that the other one is in front of, first time.",
         source="events",
-        compute=_impacts("overlap", first=True),
+        compute=_measure_impacts("overlap", first=True),
     ),
     ActorMeasure(
         name="stopped",

@@ -79,7 +79,7 @@ def read_osi_trace(file: Path, begin: float, end: float) -> RecordedTraffic:
     """
     packed = file.suffix.lower() == ".mcap"
     rows: list[_Row] = []
-    for number, place, content, is_view in _mcap_messages(file) if packed else _messages(file):
+    for number, place, content, is_view in _mcap_messages(file) if packed else _read_messages(file):
         try:
             truth = _first_message(content, _GROUND_TRUTH_OF_VIEW) if is_view else content
             rows += _objects_of(truth, begin, end)
@@ -95,7 +95,7 @@ _SCHEMA: Final = {
 }
 
 
-def _messages(file: Path) -> Iterator[tuple[int, int, bytes, bool]]:
+def _read_messages(file: Path) -> Iterator[tuple[int, int, bytes, bool]]:
     """Number, first byte, content, and whether it is a view of a sensor, of each message."""
     # The published naming of traces has sv, gt and more between underscores.
     is_view = "_sv_" in file.name or file.name.startswith("sv_")
@@ -189,7 +189,7 @@ def _first_message(content: bytes, number: int) -> bytes:
     return bytes(found)
 
 
-def _numbers(content: bytes) -> dict[int, Any]:
+def _read_numbers(content: bytes) -> dict[int, Any]:
     return dict(osi_fields(content))
 
 
@@ -198,7 +198,7 @@ def _objects_of(truth: bytes, begin: float, end: float) -> list[_Row]:
     objects = []
     for field, value in osi_fields(truth):
         if field == _TIMESTAMP:
-            stamp = _numbers(value)
+            stamp = _read_numbers(value)
             time = stamp.get(1, 0) + stamp.get(2, 0) / 1e9
         elif field == _MOVING_OBJECT:
             objects.append(value)
@@ -206,16 +206,16 @@ def _objects_of(truth: bytes, begin: float, end: float) -> list[_Row]:
         return []
     for content in objects:
         parts = dict(osi_fields(content))
-        base = {k: _numbers(value) for k, value in osi_fields(parts.get(_BASE, b"")) if k <= 5}
+        base = {k: _read_numbers(value) for k, value in osi_fields(parts.get(_BASE, b"")) if k <= 5}
         place, size = base.get(_POSITION, {}), base.get(_DIMENSION, {})
         velocity, change = base.get(_VELOCITY, {}), base.get(_ACCELERATION, {})
         kind = OSI_OBJECTS.get(parts.get(_TYPE, 0), "other")
         if parts.get(_TYPE) == OSI_VEHICLE:
-            vehicle = _numbers(parts.get(_CLASSIFICATION, b"")).get(1, 0)
+            vehicle = _read_numbers(parts.get(_CLASSIFICATION, b"")).get(1, 0)
             kind = OSI_VEHICLES.get(vehicle, "other")
         rows.append(
             _Row(
-                str(_numbers(parts.get(_ID, b"")).get(1, 0)),
+                str(_read_numbers(parts.get(_ID, b"")).get(1, 0)),
                 time,
                 kind,
                 place.get(1, 0.0),

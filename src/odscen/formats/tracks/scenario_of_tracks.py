@@ -130,7 +130,7 @@ def scenario_of_tracks(
             made["model"] = model
         begin, track = trajectory_rows(found.own, of=user)
         if is_ego or (choice.follow == "drive" and found.category != Category.PEDESTRIAN):
-            made |= _driven(found.own, begin + later)
+            made |= _fit_driving(found.own, begin + later)
         else:
             made["depart"] = round(begin + later, 6)
             rules += _rules_of(names[user], track, begin + later - step, found.own, choice, names)
@@ -292,7 +292,7 @@ class _Placing:
         return int(nodes[k])
 
 
-def _driven(own: pl.DataFrame, depart: float) -> dict[str, Any]:
+def _fit_driving(own: pl.DataFrame, depart: float) -> dict[str, Any]:
     """Departure and desired speed of a driver who drives as its track shows."""
     speeds = own["speed"]
     return {

@@ -257,7 +257,7 @@ def _crossing_pedestrians(
                 or (other_line.min(axis=0) > line.max(axis=0)).any()
             ):
                 continue
-            for place, walked, drove in _crossings(line, times, other_line, other_times):
+            for place, walked, drove in _find_crossings(line, times, other_line, other_times):
                 if abs(walked - drove) < SHORT_PET:
                     times_there = sorted((walked, drove))
                     apart = times_there[1] - times_there[0]
@@ -274,7 +274,7 @@ def _line_of(own: pl.DataFrame) -> tuple[FloatArray, FloatArray]:
     return times[kept], line[kept]
 
 
-def _crossings(
+def _find_crossings(
     a: FloatArray, a_times: FloatArray, b: FloatArray, b_times: FloatArray
 ) -> Iterator[tuple[tuple[float, float], float, float]]:
     """Where two lines cross, and when each is there; in the order of the first."""

@@ -192,7 +192,7 @@ def _refuse_wrong_value(file: GivenFile, types: Types) -> None:
             )
 
 
-def _listed(names: Sequence[object]) -> str:
+def _list_names(names: Sequence[object]) -> str:
     listed = ", ".join(str(name) for name in names[:_LISTED])
     return listed + (", ..." if len(names) > _LISTED else "")
 
@@ -262,7 +262,7 @@ def _chosen_part(given: TrackFile, column: str, option: str) -> pl.Expr | None:
     if chosen not in known:
         raise InputError(
             f"it has {len(known)} recordings, each with its own time; choose one with "
-            f"--option {option}=NAME: {_listed(known)}",
+            f"--option {option}=NAME: {_list_names(known)}",
             element=f"column {column}",
         )
     return pl.col(column).cast(pl.String) == chosen

@@ -148,10 +148,10 @@ class TurningGaps:
                 continue
             turn = self._turn_of(name, lane)
             if turn is not None:
-                self._ignore(name, self._passed_by(name, turn, lane))
+                self._set_ignored(name, self._passed_by(name, turn, lane))
                 seen.add(name)
         for name in sorted(self._given.keys() - seen):
-            self._ignore(name, [])
+            self._set_ignored(name, [])
 
     def _turn_of(self, name: str, lane: str) -> _Turn | None:
         """The turn that a vehicle is about to make, or makes."""
@@ -195,9 +195,9 @@ class TurningGaps:
     def forget(self) -> None:
         """Let all give way as SUMO has it, before the state is saved."""
         for name in sorted(self._given):
-            self._ignore(name, [])
+            self._set_ignored(name, [])
 
-    def _ignore(self, name: str, others: Sequence[str]) -> None:
+    def _set_ignored(self, name: str, others: Sequence[str]) -> None:
         wanted = frozenset(others)
         if wanted == self._given.get(name, frozenset()):
             return
@@ -218,7 +218,7 @@ class TurningGaps:
             enters = _seconds(crossing.here - crossing.half - front, speed, gains, limit)
             leaves = _seconds(crossing.here + crossing.half + length - front, speed, gains, limit)
             margin = MARGIN if lane == turn.waiting else 0.0
-            for other, to_line in self._coming(crossing, turn.target):
+            for other, to_line in self._find_oncoming(crossing, turn.target):
                 passes = self._passes(other, to_line, crossing)
                 if passes is None:
                     continue
@@ -229,7 +229,7 @@ class TurningGaps:
         # Who has to wait for one starts for none: it would be late for the others.
         return [] if kept else sorted(free)
 
-    def _coming(self, crossing: _Crossing, target: str) -> list[tuple[str, float]]:
+    def _find_oncoming(self, crossing: _Crossing, target: str) -> list[tuple[str, float]]:
         """Who is on a path, with the metres to its stop line, negative behind it."""
         found = []
         for lane, to_line in crossing.lanes:
@@ -338,7 +338,7 @@ class TurningGaps:
             return None
         parts = [via, *(link[4] for link in links[via] if link[4])]
         path = [*shape(parts[0]), *(point for part in parts[1:] for point in shape(part)[1:])]
-        meets = _meeting(shape(beyond), path)
+        meets = _find_meeting(shape(beyond), path)
         if meets is None:
             return None
         here, there, angle = meets
@@ -390,7 +390,9 @@ def _turned(one: Sequence[_Point], other: Sequence[_Point]) -> float:
     return abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
-def _meeting(one: Sequence[_Point], other: Sequence[_Point]) -> tuple[float, float, float] | None:
+def _find_meeting(
+    one: Sequence[_Point], other: Sequence[_Point]
+) -> tuple[float, float, float] | None:
     """Metres along two paths to where they first cross, and the angle there; ``None``: nowhere."""
     along = 0.0
     for start, end in pairwise(one):
