@@ -47,7 +47,7 @@ def test_a_lane_is_widened_a_crosswalk_moved_a_turn_removed_and_all_undone(
     user: OdscenPage, served: Served
 ) -> None:
     user.open_catalogue()
-    user.page.get_by_role("link", name="Mend signal_crossing").click()
+    user.page.get_by_role("link", name="Mend the map signal_crossing").click()
     side = bench(user)
     user.map.click(spot("1", -2, 70.0))
     expect(side.get_by_label("Lane width, m")).to_have_value("3.25")

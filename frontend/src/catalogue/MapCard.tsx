@@ -77,7 +77,7 @@ export function MapCard({
           size="compact-sm"
           component="a"
           href={hashOf({ view: "mend", map: map.name })}
-          aria-label={t`Mend ${map.name}`}
+          aria-label={t`Mend the map ${map.name}`}
         >
           <Trans>Mend the map</Trans>
         </Button>
