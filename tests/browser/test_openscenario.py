@@ -69,8 +69,8 @@ def test_a_dropped_scene_is_reported_edited_and_exported(
     place.click()
     expect(place).to_have_attribute("aria-pressed", "true")
     # The event is that of the other, which starts a lane to the right of the ego.
-    expect(page.locator(".map-hint")).to_have_text("x = 89.0 m, y = -5.3 m")
-    assert user.map.view()[:2] == pytest.approx((89.0, -5.25), abs=0.01)
+    expect(page.locator(".map-hint")).to_have_text("x = 88.6 m, y = -5.3 m")
+    assert user.map.view()[:2] == pytest.approx((88.6, -5.25), abs=0.01)
 
     side.get_by_role("button", name="Open in the editor").click()
     user.wait_for_editor()
