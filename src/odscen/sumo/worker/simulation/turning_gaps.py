@@ -290,9 +290,13 @@ class TurningGaps:
                     entries.append((name, onto, via))
                     if link[5] in _OBEYING:
                         obeying.add(via)
-        by_target: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
+        by_junction: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
+
+        def ends_at(source: str) -> str:
+            return str(self._sumo.edge.getToJunction(lane.getEdgeID(source)))
+
         for entry in entries:
-            by_target[_junction_of(entry[2])].append(entry)
+            by_junction[ends_at(entry[0])].append(entry)
         found: dict[str, list[_Turn]] = defaultdict(list)
         for source, onto, via in entries:
             inner = next((link[4] for link in links[via] if link[4]), "")
@@ -301,7 +305,7 @@ class TurningGaps:
                 continue
             first = set(lane.getFoes(source, onto))
             crossings = []
-            for other, other_onto, other_via in by_target[_junction_of(via)]:
+            for other, other_onto, other_via in by_junction[ends_at(source)]:
                 if other not in first or lane.getEdgeID(other_onto) == lane.getEdgeID(onto):
                     continue
                 crossing = self._find_crossing(
@@ -366,11 +370,6 @@ class TurningGaps:
                 known.update(more)
                 ahead += [(one, to_line) for one in more]
         return found
-
-
-def _junction_of(inner: str) -> str:
-    """The junction of an internal lane, by SUMO's names."""
-    return inner.rsplit("_", 2)[0]
 
 
 def _seconds(metres: float, speed: float, gains: float, limit: float) -> float:
