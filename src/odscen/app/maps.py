@@ -7,14 +7,13 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from odscen.lanegraph.parking_areas import map_parking
-from odscen.maps.edited_map import EditedMap
-from odscen.opendrive.parse import parse
 from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.sumo_map import SumoMap
 from odscen.sumo.realize.usable import usable_places
 
 if TYPE_CHECKING:
     from odscen.drawing.map_drawing import MapDrawing
+    from odscen.maps.edited_map import EditedMap
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
@@ -65,6 +64,9 @@ def load_map(entry: MapEntry) -> LoadedMap:
 @lru_cache(maxsize=2)
 def map_to_mend(entry: MapEntry) -> EditedMap:
     """Load a map to look at what edits would find on it; the last two stay in memory."""
+    from odscen.maps.edited_map import EditedMap  # late: no run needs what reads OpenDRIVE
+    from odscen.opendrive.parse import parse
+
     return EditedMap(parse(entry.read("xodr"), file=entry.name))
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.special import fresnel
 
 from odscen.base.arrays import FloatArray, IntArray, offsets
 from odscen.opendrive.profiles import locate
@@ -161,6 +160,8 @@ def _evaluate_spiral(
     if at.size:
         sign = np.sign(change[at])
         k, sigma, root = sign * curvature[at], np.abs(change[at]), scale[at]
+        from scipy.special import fresnel  # late: few runs have spirals, and it takes long to load
+
         sin0, cos0 = fresnel(k / root)
         sin1, cos1 = fresnel((k + sigma * ds[at]) / root)
         moved = (cos1 - cos0) + 1j * (sin1 - sin0)
