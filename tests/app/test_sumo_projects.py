@@ -124,6 +124,7 @@ def test_a_project_opens_with_a_map_that_has_its_network(
 ) -> None:
     entry = store.map("grid")
     assert scenario.map.sha256 == entry.sha256
+    assert scenario.name == "grid"  # the file is only called run
     edges = {edge for edge in entry.lane_table().edges if not edge.startswith(":")}
     net = etree.parse(project / "grid.net.xml").getroot()
     assert edges == {e.get("id") for e in net.iter("edge") if e.get("function") is None}
@@ -283,6 +284,30 @@ def test_bologna_runs_as_sumo_runs_it_with_its_seven_programs(
     done = run(store, made.scenario, name="bologna")
     assert_agrees(done, alone)
     assert not done.events().filter(pl.col("kind") == "route_changed").height
+
+
+def test_whom_sumo_ignores_in_a_route_file_is_named_and_not_planned(
+    store: Workspace, project: Path
+) -> None:
+    (project / "late.rou.xml").write_text(
+        '<routes><route id="late" edges="A0B0 B0C0"/>'
+        '<vehicle id="a" route="late" depart="110"/><flow id="f" route="late" begin="100" end="130"'
+        ' period="10"/><vehicle id="b" route="late" depart="105"/>'
+        '<vehicle id="c" route="late" depart="110"/></routes>'
+    )
+    (project / "late.sumocfg").write_text(
+        '<configuration><input><net-file value="grid.net.xml"/><route-files value="late.rou.xml"/>'
+        '</input><time><begin value="100"/><end value="300"/></time></configuration>'
+    )
+    made = import_file(store, project / "late.sumocfg")
+    assert made.scenario is not None
+    done = run(store, made.scenario, name="late")
+    assert sorted(done.actors()["id"]) == ["a", "c"]
+    assert set(done.actors()["status"]) == {"arrived"}
+    assert [note for note in done.summary["notes"] if "late.rou" in note] == [
+        "late.rou.xml: SUMO ignores 2 that depart before those above them, flow 'f' the first; "
+        "sort the file by departure, for example with sort_routes.py"
+    ]
 
 
 def test_nothing_is_written_outside_the_run(finished: Run) -> None:

@@ -36,10 +36,10 @@ _DROP = """([element, files]) => {
 
 
 def drop(page: Page, files: Mapping[str, str]) -> None:
-    """Drop files on the heading of the catalogue, as a hand does from a file manager."""
+    """Drop files on the catalogue, as a hand does from a file manager."""
     packed = {name: base64.b64encode(text.encode()).decode() for name, text in files.items()}
-    heading = page.get_by_role("heading", level=1).element_handle()
-    page.evaluate(_DROP, [heading, packed])
+    catalogue = page.locator(".catalogue").element_handle()
+    page.evaluate(_DROP, [catalogue, packed])
 
 
 def test_a_dropped_scene_is_reported_edited_and_exported(

@@ -91,7 +91,7 @@ def test_a_study_of_a_changed_light_and_a_closure_goes_from_drop_to_intervals_by
     options = page.get_by_role("option")
     expect(options.first).to_be_visible()
     for row in range(options.count()):
-        if options.nth(row).inner_text().startswith("run"):
+        if options.nth(row).inner_text().startswith("grid"):
             options.nth(row).click()
     page.keyboard.press("Escape")
     page.get_by_role("button", name=re.compile(r"^Start \d+ runs$")).click()

@@ -1761,6 +1761,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "{figure}: {seeds} seeds are too few for {wanted}" }),
   msg({ message: "{files} files are" }),
   msg({ message: "{file} is there already; give the scenario another name" }),
+  msg({ message: "{file}: SUMO ignores {ignored} that depart before those above them, {ignored2} the first; sort the file by departure, for example with sort_routes.py" }),
   msg({ message: "{file}: expected {expected}, found {found}" }),
   msg({ message: "{file}: not a catalogue of models ({error}); remove it or fetch it again" }),
   msg({ message: "{final} is written by other processes all the time" }),

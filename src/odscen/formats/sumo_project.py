@@ -57,6 +57,8 @@ _EMBEDS: Final = ("variableSpeedSign", "rerouter")
 """Elements whose ``file`` is read, and not written."""
 _ROOTS: Final = frozenset(("configuration", "sumoConfiguration", "sumoGuiConfiguration"))
 _MOST_INCLUDES: Final = 20
+_USUAL_NAMES: Final = frozenset(("run", "sumo", "config", "simulation", "scenario", "test", "osm"))
+"""What configurations are called whatever is in them: their scenario takes the map's name."""
 
 
 class _ReadFile(NamedTuple):
@@ -317,7 +319,7 @@ def _empty_scenario(
         )
     return edits.new_scenario(
         graph,
-        name=source.name,
+        name=on_map.name if source.name.lower() in _USUAL_NAMES else source.name,
         roi=[str(name) for name, within in zip(ids, inside.tolist(), strict=True) if within],
         seed=seed,
         description="A SUMO project.",

@@ -27,7 +27,7 @@ from odscen.records.run_plan import PlannedActor
 from odscen.runs import layout
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.document.sumo_document import SumoFile, SumoProject
@@ -132,13 +132,13 @@ def project_files(
             text = file.text
             root = read_xml(text, huge=True)
             texts[name] = _made_harmless(root, text)
-            roots.append((file.name, root))
+            roots.append((file, root))
     # Additional files come first in SUMO, so types and routes of any file are known to all.
     for _, root in roots:
         reader.read_types(root)
-    for name, root in roots:
-        with in_file(name):
-            reader.read_users(root)
+    for file, root in roots:
+        with in_file(file.name):
+            reader.read_users(root, file.name, sorted_only=file.kind == "routes")
     return ProjectFiles(
         tuple(n for n, f in zip(names, project.files, strict=True) if f.kind == "routes"),
         tuple(n for n, f in zip(names, project.files, strict=True) if f.kind == "additional"),
@@ -248,6 +248,8 @@ class _Type:
 
 
 _CAR = _Type(Category.CAR, DEFAULT_BODY[Category.CAR])
+_USERS = ("vehicle", "trip", "flow", "person", "personFlow")
+_FLOWS = ("flow", "personFlow")
 
 
 class _UserReader:
@@ -287,9 +289,13 @@ class _UserReader:
             if inner and element.get("id"):
                 self._routes[str(element.get("id"))] = inner[0]
 
-    def read_users(self, root: etree._Element) -> None:
-        """Read who is on the road."""
-        for element in root.iterchildren("vehicle", "trip", "flow", "person", "personFlow"):
+    def read_users(self, root: etree._Element, file: str, *, sorted_only: bool) -> None:
+        """Read who is on the road; with ``sorted_only`` those whom SUMO takes from a route file.
+
+        SUMO reads route files on the way, and ignores whoever would depart before the one that
+        stands before it.
+        """
+        for element in self._taken_users(root, file, sorted_only=sorted_only):
             if len(self._actors) >= MOST_LISTED:
                 self.notes.append(f"only the first {MOST_LISTED} road users are in the plan")
                 return
@@ -298,13 +304,35 @@ class _UserReader:
             kind = self._types.get(element.get("type", ""), _CAR)
             if element.tag in ("person", "personFlow"):
                 kind = self._types.get(element.get("type", ""), self._types["DEFAULT_PEDTYPE"])
-            if element.tag in ("flow", "personFlow"):
+            if element.tag in _FLOWS:
                 self._add_flow(element, name, edges, kind)
                 continue
             depart = seconds_of(element.get("depart"))
             if depart is None:
                 depart = self._until  # triggered by another: not due at any known time
             self._add_user(name, depart, edges, kind, flow=None, appears=element.get("depart"))
+
+    def _taken_users(
+        self, root: etree._Element, file: str, *, sorted_only: bool
+    ) -> Iterator[etree._Element]:
+        """Vehicles, flows and persons of a file without those that SUMO ignores, who are noted."""
+        latest = -math.inf
+        ignored: list[str] = []
+        for element in root.iterchildren(*_USERS):
+            flow = element.tag in _FLOWS
+            depart = seconds_of(element.get("begin", "0") if flow else element.get("depart"))
+            if sorted_only and depart is not None:
+                if depart < latest:
+                    ignored.append(f"{element.tag} '{element.get('id', '')}'")
+                    continue
+                latest = depart
+            yield element
+        if ignored:
+            self.notes.append(
+                f"{file}: SUMO ignores {len(ignored)} that depart before those above them, "
+                f"{ignored[0]} the first; sort the file by departure, for example with "
+                "sort_routes.py"
+            )
 
     def _edges_of(self, element: etree._Element) -> tuple[str, ...]:
         """Edges of a route, or of a trip those that it names."""
