@@ -65,7 +65,8 @@ def test_a_link_under_the_name_of_the_scratch_folder_is_not_followed(
 ) -> None:
     other = tmp_path / "other"
     leftover = other / ".building-mine"
-    leftover.mkdir(parents=True)
+    other.mkdir(mode=0o700)  # all right but for the link to it
+    leftover.mkdir()
     (temporary / f"odscen-{os.getuid()}").symlink_to(other)
     with scratch_folder() as folder:
         assert folder.resolve().is_relative_to(temporary)

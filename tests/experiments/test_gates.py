@@ -9,6 +9,7 @@ from lxml import etree
 from odscen.base.errors import InputError
 from odscen.experiments.annotations import code_quality, github_annotations
 from odscen.experiments.baseline import fingerprint
+from odscen.experiments.datasets import DatasetPlan
 from odscen.experiments.gates import (
     Update,
     _with_fields,
@@ -553,11 +554,13 @@ def test_a_changed_map_of_a_suite_is_none_to_choose_or_sample_from(tmp_path):
     assert entry.name == f"t_junction_signs-{entry.sha256[:8]}-odscen"
     assert own.map_names() == ["t_junction_signs"]
     assert [one.name for one in own.maps()] == ["t_junction_signs"]
-    plan = StudyPlan.model_validate({"name": "n", "sample": [{"maps": ["*"], "count": 2}]})
-    assert set(found_sources(plan, own, beside=tmp_path)) == {
-        "t_junction_signs-0000",
-        "t_junction_signs-0001",
-    }
+    sample = {"sample": [{"maps": ["*"], "count": 2}]}
+    plan = StudyPlan.model_validate({"name": "n", **sample})
+    sources = found_sources(plan, own, beside=tmp_path)
+    assert set(sources) == {"t_junction_signs-0000", "t_junction_signs-0001"}
+    parts = {"licence": "MIT", "splits": {"train": ["t_junction_signs"]}, "study": sample}
+    dataset = DatasetPlan.model_validate({"name": "n", **parts})
+    dataset.refuse_without_split({source.map_name for source in sources.values()})
     # It is found again by what it is, by the next test and by a run of this one.
     (again,) = load_cases(own, suite, with_baseline=False)
     assert again.run.entry.folder == entry.folder

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
+from odscen.scenario.checks import rule_checks
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.signals.light import Light
 from tests.scenario.checks.test_scenario_checks import actor, problems
@@ -106,6 +108,24 @@ def test_of_very_many_rules_that_move_one_actor_some_pairs_are_listed_and_all_co
         "rules 'r0' and 'r2' bo",
     ]
     assert (clashes[-1].where, clashes[-1].message) == ("rules", "and 499,300 more of this kind")
+
+
+def test_pairs_of_rules_that_are_not_listed_are_not_looked_at_either(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looked_at = 0
+    pairs = rule_checks._RuleClashes.pairs
+
+    def counted_pairs(clashes: Any) -> Iterator[tuple[int, int]]:
+        nonlocal looked_at
+        for pair in pairs(clashes):
+            looked_at += 1
+            yield pair
+
+    monkeypatch.setattr(rule_checks._RuleClashes, "pairs", counted_pairs)
+    rules = [rule(id=f"r{n}") for n in range(300)]
+    assert problems(VAN, rules=rules)[-1].message == "and 44,650 more of this kind"
+    assert looked_at == 200
 
 
 def test_rules_that_wait_or_move_otherwise_are_no_pairs_of_those_that_are_counted() -> None:
