@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import http.client
 import json
+import re
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
 from odscen.app.scenarios import SUFFIX
+from odscen.cli import commands
 from odscen.maps.store import Workspace
 from odscen.web.routes import scenario_routes
 from tests.web.conftest import serving
+
+LIMITS = Path(__file__).parents[2] / "docs" / "limits.md"
 
 
 def rules_of_one_actor(workspace: Workspace, name: str, number: int) -> bytes:
@@ -114,3 +119,15 @@ def test_edits_of_one_request_have_so_much_time_and_are_made_all_or_none(
     answer = client.post(f"/api/scenarios/{sampled}/edits", json=body)
     assert answer.status_code == 200
     assert len(answer.json()["document"]["measures"]) == 400
+
+
+def test_each_command_and_route_has_its_limits_in_the_document(client: TestClient) -> None:
+    table = LIMITS.read_text("utf-8").partition("## Commands and routes")[2]
+    rows = [line.split("|")[1:4] for line in table.splitlines() if line.startswith("| `")]
+    assert all(limits.strip() for _, _, limits in rows)
+    of_commands, of_routes = (
+        {*re.findall("`([a-z-]+)`", " ".join(row[column] for row in rows))} for column in (0, 1)
+    )
+    assert of_commands == {*commands._COMMANDS, *commands._GROUPS}
+    paths = client.get("/api/openapi.json").json()["paths"]
+    assert of_routes == {path.split("/")[2] for path in paths}
