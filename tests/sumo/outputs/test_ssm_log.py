@@ -1,8 +1,14 @@
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
-from odscen.sumo.outputs.conflict_files import logged_conflicts
+import polars as pl
+
+from odscen.figures.measures import safety
+from odscen.figures.measures.figure import RunData
+from odscen.figures.measures.registry import figure_values
+from odscen.sumo.outputs.conflict_files import logged_conflicts, tidy_conflicts
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,3 +34,14 @@ def test_bodies_that_overlap_from_the_start_are_a_conflict_without_a_place(tmp_p
     assert (overlap["one"], overlap["other"], overlap["ttc"]) == ("bus-1", "car-3", 0.0)
     assert (overlap["x"], overlap["y"], overlap["kind"]) == (None, None, "following")
     assert (later["x"], later["y"], later["kind"], later["ttc"]) == (12.5, 1.0, "merging", 1.25)
+
+
+def test_the_table_and_the_figures_of_a_run_have_a_conflict_without_a_place(tmp_path: Path) -> None:
+    (tmp_path / "ssm.xml").write_text(OVERLAPPING, encoding="utf-8")
+    plan: Any = SimpleNamespace(net_offset=(100.0, 30.0), actors=())
+    tidy_conflicts(tmp_path, plan)
+    assert [path.name for path in tmp_path.iterdir()] == ["conflicts.parquet"]
+    table = pl.read_parquet(tmp_path / "conflicts.parquet").sort("begin")
+    assert table["x"].to_list() == [None, 12.5]
+    figures = figure_values(RunData(conflicts=table), safety.FIGURES)
+    assert figures["min_ttc"] == 0.0
