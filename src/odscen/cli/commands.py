@@ -60,6 +60,7 @@ _COMMANDS = {
     "search": "sweep_command:search",
     "test": "regression_commands:gate",
     "compare": "regression_commands:compare",
+    "history": "regression_commands:show_history",
     "diff": "difference_commands:diff_scenarios",
     "cosim": "cosim_commands:cosim",
     "serve": "serve_command:serve",

@@ -102,6 +102,26 @@ def gate(
             "writes gl-code-quality-report.json.",
         ),
     ] = None,
+    sarif: Annotated[
+        Path | None, typer.Option(help="Write findings as SARIF 2.1.0.", dir_okay=False)
+    ] = None,
+    badge: Annotated[
+        Path | None, typer.Option(help="Write a badge of the result, as SVG.", dir_okay=False)
+    ] = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            help="Add the figures of this run to a history, for `odscen history`.",
+            dir_okay=False,
+        ),
+    ] = None,
+    commit: Annotated[
+        str | None,
+        typer.Option(
+            help="With --history: the commit. [default: that of the CI job, else of git]",
+            show_default=False,
+        ),
+    ] = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -119,6 +139,10 @@ def gate(
     read, store = read_suite(suite), Workspace.open(workspace)
     if force and not update_baseline:
         raise typer.BadParameter("it goes with --update-baseline", param_hint="--force")
+    if commit is not None and history is None:
+        raise typer.BadParameter("it goes with --history", param_hint="--commit")
+    # Asked before anything runs, so that a run of an hour does not end with an error.
+    known = None if history is None else _known_commit(commit, suite)
     if seeds is not None:
         read = read.with_seeds(seeds)
     if shard is not None:
@@ -134,12 +158,34 @@ def gate(
             parts=read_parts(merge) if merge else None,
         )
     _write_results(result, store, junit=junit, html=html, summary=summary, results=results)
+    _write_findings(result, sarif=sarif, badge=badge)
+    if history is not None and known is not None:
+        from odscen.experiments.history import append_history, history_line
+
+        append_history(history, history_line(result, commit=known[0], date=known[1]))
     if as_json:
         print_json(to_dict(result))
     _show_result(result, as_json=as_json)
     if annotations is not None:
         _print_annotations(result, annotations, as_json=as_json)
     raise typer.Exit(result.exit_code)
+
+
+def _known_commit(commit: str | None, suite: Path) -> tuple[str, str]:
+    from odscen.experiments.history import current_commit
+
+    return (commit, "") if commit is not None else current_commit(suite.resolve().parent)
+
+
+def _write_findings(result: SuiteResult, *, sarif: Path | None, badge: Path | None) -> None:
+    from odscen.base.text_files import write_text
+    from odscen.experiments.annotations import sarif as sarif_log
+    from odscen.experiments.badge import suite_badge
+
+    if sarif is not None:
+        write_text(sarif, sarif_log(result))
+    if badge is not None:
+        write_text(badge, suite_badge(result))
 
 
 def _write_results(
@@ -197,6 +243,53 @@ def _print_annotations(result: SuiteResult, form: Annotations, *, as_json: bool)
         return
     # GitHub reads both; with --json stdout is one object.
     typer.echo(github_annotations(result), nl=False, err=as_json)
+
+
+def show_history(
+    file: Annotated[Path, typer.Argument(help="History, written by `odscen test --history`.")],
+    html: HtmlOption = None,
+    suite: Annotated[
+        str | None, typer.Option(help="Only runs of the suite of this name.", metavar="NAME")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show since when which figure of a suite has changed, over commits."""
+    from odscen.base.errors import NotFoundError
+    from odscen.base.text_files import write_text
+    from odscen.experiments.history import find_trends, history_page, read_history, told_lines
+
+    history = read_history(file)
+    if suite is not None:
+        names = sorted({line.suite for line in history})
+        history = tuple(line for line in history if line.suite == suite)
+        if not history:
+            raise NotFoundError("suite", suite, names)
+    trends = find_trends(history)
+    if html is not None:
+        write_text(html, history_page(history))
+    if as_json:
+        commits = [line.commit for line in history]
+        rows = [
+            {
+                "scenario": trend.scenario,
+                "figure": trend.figure,
+                "levels": [
+                    {
+                        "first": commits[level.first],
+                        "last": commits[level.last],
+                        "value": level.value,
+                    }
+                    for level in trend.levels
+                ],
+                "other_seeds": trend.other_seeds,
+                "better": trend.better,
+            }
+            for trend in trends
+        ]
+        print_json({"runs": commits, "figures": rows})
+        return
+    for text in told_lines(history, trends):
+        typer.echo(text)
 
 
 def compare(

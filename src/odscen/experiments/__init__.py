@@ -11,10 +11,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from odscen.experiments.annotations import sarif as sarif
+    from odscen.experiments.badge import suite_badge as suite_badge
     from odscen.experiments.comparisons import RunComparison as RunComparison
     from odscen.experiments.comparisons import compare as compare
     from odscen.experiments.gates import Update as Update
     from odscen.experiments.gates import run_suite as run_suite
+    from odscen.experiments.history import HistoryLine as HistoryLine
+    from odscen.experiments.history import append_history as append_history
+    from odscen.experiments.history import find_trends as find_trends
+    from odscen.experiments.history import history_line as history_line
+    from odscen.experiments.history import history_page as history_page
+    from odscen.experiments.history import read_history as read_history
     from odscen.experiments.plan import StudyPlan as ExperimentPlan
     from odscen.experiments.plan import read_study_plan as read_study_plan
     from odscen.experiments.searches import SearchResult as SearchResult
@@ -62,6 +70,14 @@ _HOMES = {
     "read_suite": "odscen.experiments.suite",
     "junit_xml": "odscen.experiments.suite_words",
     "suite_summary": "odscen.experiments.suite_words",
+    "HistoryLine": "odscen.experiments.history",
+    "append_history": "odscen.experiments.history",
+    "find_trends": "odscen.experiments.history",
+    "history_line": "odscen.experiments.history",
+    "history_page": "odscen.experiments.history",
+    "read_history": "odscen.experiments.history",
+    "sarif": "odscen.experiments.annotations",
+    "suite_badge": "odscen.experiments.badge",
     "Sweep": "odscen.experiments.sweeps",
     "SweepEstimate": "odscen.experiments.sweeps",
     "SweepSettings": "odscen.experiments.sweeps",
@@ -79,6 +95,7 @@ __all__ = [
     "CaseStatus",
     "ExperimentPlan",
     "ExperimentResults",
+    "HistoryLine",
     "Range",
     "RunComparison",
     "SearchResult",
@@ -91,17 +108,24 @@ __all__ = [
     "SweepSettings",
     "Table",
     "Update",
+    "append_history",
     "axis_from_text",
     "compare",
     "estimate",
     "experiment_results",
+    "find_trends",
+    "history_line",
+    "history_page",
     "junit_xml",
+    "read_history",
     "read_study_plan",
     "read_suite",
     "resume_experiment",
     "run_experiment",
     "run_suite",
+    "sarif",
     "search",
+    "suite_badge",
     "suite_summary",
     "sweep",
 ]

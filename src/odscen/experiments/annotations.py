@@ -1,4 +1,4 @@
-"""Findings of a suite where reviewers see them: annotations for GitHub, code quality for GitLab.
+"""Findings of a suite where reviewers see them: GitHub, GitLab, and what reads SARIF.
 
 Each finding has the file and the line that it is about: of a changed map the road in its .xodr, of
 a changed scenario the part that has the changed field.
@@ -11,7 +11,9 @@ import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+from urllib.parse import quote
 
+from odscen.base.version import __version__
 from odscen.experiments.suite import CaseStatus
 from odscen.experiments.suite_words import MOST_PROBLEMS, details, headline
 from odscen.maps.folder_names import name_from_file
@@ -125,6 +127,45 @@ def code_quality(result: SuiteResult) -> str:
             }
         )
     return json.dumps(rows, indent=1, ensure_ascii=False) + "\n"
+
+
+_SARIF = "https://json.schemastore.org/sarif-2.1.0.json"
+
+
+def sarif(result: SuiteResult) -> str:
+    """A SARIF 2.1.0 log, JSON; the same findings have the same fingerprints."""
+    rows = []
+    for finding in findings(result):
+        path = _relative(finding.file)
+        known = f"{result.suite.name}\n{path}\n{finding.title}\n{finding.words}"
+        digest = hashlib.sha256(known.encode()).hexdigest()
+        place = {"artifactLocation": {"uri": _uri(path)}, "region": {"startLine": finding.line}}
+        rows.append(
+            {
+                "ruleId": "odscen-test",
+                "level": "error" if finding.failed else "warning",
+                "message": {"text": f"{finding.title}: {finding.words}"},
+                "locations": [{"physicalLocation": place}],
+                "partialFingerprints": {"odscen/v1": digest},
+            }
+        )
+    about = "A scenario of a suite is not as its baseline, or falls short of what is expected."
+    driver = {
+        "name": "odscen",
+        "version": __version__,
+        "rules": [{"id": "odscen-test", "shortDescription": {"text": about}}],
+    }
+    log = {
+        "$schema": _SARIF,
+        "version": "2.1.0",
+        "runs": [{"tool": {"driver": driver}, "results": rows}],
+    }
+    return json.dumps(log, indent=1, ensure_ascii=False) + "\n"
+
+
+def _uri(path: str) -> str:
+    """Reference to a file: relative to the repository, or absolute outside it."""
+    return Path(path).as_uri() if path.startswith("/") else quote(path)
 
 
 def _relative(file: Path) -> str:
