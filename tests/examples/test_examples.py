@@ -107,6 +107,19 @@ def test_the_regression_test_passes_and_fails_when_the_bound_is_tighter(tmp_path
 
 
 @pytest.mark.slow
+def test_lights_are_learned_and_judged_beside_four_controls(tmp_path: Path) -> None:
+    pytest.importorskip("gymnasium")
+    command = [sys.executable, "-W", "error", str(EXAMPLES / "learn_lights.py"), str(tmp_path), "2"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "agent.npz").is_file()
+    lines = done.stdout.splitlines()
+    assert len(lines) == 10
+    assert re.match(r"signal_crossing, fixed: [\d.]+ s, \+0\.0 s", lines[0])
+    assert re.match(r"left_hand_crossing, agent: [\d.]+ s, [-+][\d.]+ s \([-+]", lines[9])
+
+
+@pytest.mark.slow
 def test_the_edited_scene_is_undone_timed_and_run(workspace: Path) -> None:
     text = printed("edit_and_run.py", workspace)
     assert "undone: Change the seed, seed 0" in text

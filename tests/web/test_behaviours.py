@@ -22,9 +22,11 @@ def start(client: TestClient, scenario: str, name: str, **options: object) -> An
 
 
 def test_the_models_that_ship_are_offered_with_their_options(client: TestClient) -> None:
-    idm, imitation = client.get("/api/behaviours").json()
+    idm, imitation, pressure = client.get("/api/behaviours").json()
     assert [idm["name"], imitation["name"]] == ["idm", "imitation"]
-    assert not idm["error"]
+    assert pressure["name"] == "max-pressure"
+    assert not any(one["error"] for one in (idm, imitation, pressure))
+    assert {one["name"] for one in pressure["options"]} == {"interval", "hold"}
     options = {one["name"]: one for one in idm["options"]}
     assert options["headway"]["title"] == "Time headway, s"
     assert (options["headway"]["usual"], options["headway"]["low"]) == (1.2, 0.0)
@@ -63,6 +65,7 @@ def test_a_run_is_driven_by_the_model_that_is_chosen(
         ("drivers.py:Mine", {}, 404, "idm"),
         ("idm", {"headway": 99}, 422, "not within 0..10"),
         ("idm", {"haste": 1}, 422, "it has no option 'haste'"),
+        ("signal-agent", {"agent": "/etc/passwd"}, 404, "behaviour model"),
         ("imitation", {"weights": "/etc/passwd"}, 422, "it has no option 'weights'"),
     ],
 )

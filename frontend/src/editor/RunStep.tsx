@@ -104,7 +104,7 @@ export function RunStep({
         <>
           <ModelChoice
             offered={models.behaviours}
-            label={t`Vehicles driven by`}
+            label={t`Vehicles and lights controlled by`}
             none={t`SUMO’s drivers`}
             words={driverWords}
             unusable={t`This behaviour model cannot be used`}

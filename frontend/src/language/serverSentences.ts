@@ -697,6 +697,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "it starts {metres} m ahead" }),
   msg({ message: "it starts {metres} m behind" }),
   msg({ message: "it stays where it is: odscen has no height or tilt" }),
+  msg({ message: "it switches lights, and map {name} has none with two stages or more" }),
   msg({ message: "it takes about {needed}" }),
   msg({ message: "it took more than {time_limit} s" }),
   msg({ message: "it would have to go at {needed} m/s to be there in time" }),

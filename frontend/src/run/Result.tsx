@@ -70,7 +70,7 @@ export function Result({
       </Title>
       {info.summary?.behaviour && (
         <Text size="sm" c="dimmed">
-          <Trans>Vehicles driven by: {driverWords(info.summary.behaviour)}</Trans>
+          <Trans>Controlled by: {driverWords(info.summary.behaviour)}</Trans>
         </Text>
       )}
       {verdict && <Reservations verdict={verdict} />}

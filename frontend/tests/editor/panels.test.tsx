@@ -405,7 +405,7 @@ test("a run is played by the simulator that is chosen, and what that leaves out 
   await screen.findByRole("textbox", { name: "Simulator" });
   await choose(user, "Simulator", "steady");
   expect(await screen.findByText("Steady traffic does not follow rule r")).toBeTruthy();
-  expect(screen.queryByLabelText("Vehicles driven by")).toBeNull();
+  expect(screen.queryByLabelText("Vehicles and lights controlled by")).toBeNull();
   await user.click(screen.getByRole("button", { name: "Run" }));
   expect(onRun).toHaveBeenLastCalledWith({
     scenario: "s",
@@ -436,20 +436,20 @@ test("measures are listed with what they do and when", () => {
 
 test("SUMO drives the vehicles, or a behaviour model with options that differ from its usual ones", async () => {
   const { user, onRun } = toRun(scenario([actor("a")]));
-  expect(await screen.findByRole("textbox", { name: "Vehicles driven by" })).toHaveProperty(
+  expect(await screen.findByRole("textbox", { name: "Vehicles and lights controlled by" })).toHaveProperty(
     "value",
     "SUMO’s drivers",
   );
-  await choose(user, "Vehicles driven by", "Intelligent driver model");
+  await choose(user, "Vehicles and lights controlled by", "Intelligent driver model");
   expect(screen.getByText(/with lane changes by MOBIL/)).toBeTruthy();
   await user.click(screen.getByRole("button", { name: "Run" }));
   expect(onRun.mock.lastCall?.[0]).toHaveProperty("behaviour", { name: "idm", options: {} });
   await fill(user, "Time headway, s", "0.8");
   await user.click(screen.getByRole("button", { name: "Run" }));
   expect(onRun.mock.lastCall?.[0]).toHaveProperty("behaviour", { name: "idm", options: { headway: 0.8 } });
-  await choose(user, "Vehicles driven by", "Behaviour model gone");
+  await choose(user, "Vehicles and lights controlled by", "Behaviour model gone");
   expect(screen.getByRole("alert").textContent).toContain("it cannot be imported");
-  await choose(user, "Vehicles driven by", "SUMO’s drivers");
+  await choose(user, "Vehicles and lights controlled by", "SUMO’s drivers");
   await user.click(screen.getByRole("button", { name: "Run" }));
   expect(onRun.mock.lastCall?.[0]).not.toHaveProperty("behaviour");
 });

@@ -57,8 +57,9 @@ BuildMinutesOption = Annotated[
 BehaviourOption = Annotated[
     str | None,
     typer.Option(
-        help="What drives vehicles instead of SUMO: idm, imitation, an entry point, "
-        "package.module:Class or FILE.py:Class.",
+        help="What drives vehicles instead of SUMO (idm, imitation) or switches lights "
+        "(max-pressure, signal-agent): one of these, an entry point, package.module:Class or "
+        "FILE.py:Class.",
         metavar="NAME",
     ),
 ]

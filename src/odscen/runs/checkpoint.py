@@ -67,6 +67,8 @@ class Checkpoint:
         if there are none.
     driven
         Ids of vehicles that a behaviour model has driven.
+    lights
+        What lights show that a model switches, by their ids.
     """
 
     number: int
@@ -84,6 +86,7 @@ class Checkpoint:
     lanes: dict[str, int] = field(default_factory=dict)
     story: dict[str, Any] = field(default_factory=dict)
     driven: list[str] = field(default_factory=list)
+    lights: dict[str, Any] = field(default_factory=dict)
 
 
 def slice_folder(run: Path, number: int) -> Path:

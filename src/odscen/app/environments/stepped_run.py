@@ -28,6 +28,8 @@ from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from odscen.base.arrays import BoolArray
     from odscen.base.given_files import GivenPath
     from odscen.learning.behaviour.behaviour_model import (
@@ -41,14 +43,14 @@ if TYPE_CHECKING:
 
 LEAN = RunSettings(recording=Recording(emissions=False), slice_length=None)
 """How such a run is made if nothing else is said."""
-_PATIENCE = 3600.0
+PATIENCE = 3600.0
 """Wall seconds that the simulation waits for a step."""
 _LISTEN = 0.2
 """Wall seconds after which a wait looks whether the run is over."""
 
 
-class SteppedRun:
-    """One run; :meth:`see` and :meth:`drive` in turn.
+class HeldRun:
+    """One run, in a process of its own, that waits for this one at a socket.
 
     Parameters
     ----------
@@ -57,12 +59,9 @@ class SteppedRun:
     scenario
         The scenario, or its file.
     settings
-        How it is run; its behaviour is this one.
-
-    Attributes
-    ----------
-    scene
-        Of the run.
+        How it is run; its behaviour is the one at the socket.
+    door
+        Makes that of the socket's path.
 
     Raises
     ------
@@ -73,20 +72,24 @@ class SteppedRun:
     """
 
     def __init__(
-        self, workspace: Workspace, scenario: Scenario | GivenPath, *, settings: RunSettings = LEAN
+        self,
+        workspace: Workspace,
+        scenario: Scenario | GivenPath,
+        *,
+        settings: RunSettings,
+        door: Callable[[str], BehaviourDoor],
     ) -> None:
         self._scratch = ExitStack()
         folder = self._scratch.enter_context(scratch_folder())
         self._failure: BaseException | None = None
         self._run: Run | None = None
         path = folder / "drive"
-        door = BehaviourDoor(socket=str(path), time_limit=_PATIENCE)
         checked = check_given(
             workspace,
             scenario,
             name="run",
             out=folder,
-            settings=replace(settings, behaviour=door),
+            settings=replace(settings, behaviour=door(str(path))),
         )
         prepared = prepare_run(checked)
 
@@ -103,13 +106,13 @@ class SteppedRun:
             listener.settimeout(_LISTEN)
             self._thread.start()
             self._connection = self._accept_worker(listener)
-        first = self._read_message()
+        first = self.read_message()
         if first is None:
             raise self._explain_early_end()
-        self.scene: BehaviourScene = scene_from_bytes(first)[0]
-        self._connection.sendall(framed(b""))
+        self.first = first
+        self.answer(b"")
 
-    def see(self) -> RoadObservation | None:
+    def wait(self) -> bytes | None:
         """Wait for the next step; ``None`` once the run is over.
 
         Raises
@@ -117,17 +120,17 @@ class SteppedRun:
         SimulationError
             If it has failed.
         """
-        data = self._read_message()
+        data = self.read_message()
         if data is not None:
-            return observation_from_bytes(data)
+            return data
         self._thread.join()
         if self._run is None or self._run.status is not RunStatus.COMPLETED:
             raise self._explain_early_end()
         return None
 
-    def drive(self, action: DrivingAction, controlled: BoolArray) -> None:
+    def answer(self, data: bytes) -> None:
         """Let the step be made."""
-        self._connection.sendall(framed(action_bytes(action, controlled)))
+        self._connection.sendall(framed(data))
 
     def close(self) -> None:
         """End the run, wherever it is, and remove its files."""
@@ -146,7 +149,8 @@ class SteppedRun:
                 found.settimeout(None)
                 return found
 
-    def _read_message(self) -> bytes | None:
+    def read_message(self) -> bytes | None:
+        """Wait for a message; ``None`` at the end of the run."""
         head = self._read_bytes(HEAD.size)
         return None if head is None else self._read_bytes(HEAD.unpack(head)[0])
 
@@ -165,3 +169,37 @@ class SteppedRun:
             return self._failure
         said = "it ended before its first step" if self._run is None else self._run.summary["error"]
         return SimulationError(str(said or "it ended before its first step"))
+
+
+class SteppedRun(HeldRun):
+    """One run whose vehicles this process drives; :meth:`see` and :meth:`drive` in turn.
+
+    Attributes
+    ----------
+    scene
+        Of the run.
+    """
+
+    def __init__(
+        self, workspace: Workspace, scenario: Scenario | GivenPath, *, settings: RunSettings = LEAN
+    ) -> None:
+        def door(path: str) -> BehaviourDoor:
+            return BehaviourDoor(socket=path, time_limit=PATIENCE)
+
+        super().__init__(workspace, scenario, settings=settings, door=door)
+        self.scene: BehaviourScene = scene_from_bytes(self.first)[0]
+
+    def see(self) -> RoadObservation | None:
+        """Wait for the next step; ``None`` once the run is over.
+
+        Raises
+        ------
+        SimulationError
+            If it has failed.
+        """
+        data = self.wait()
+        return None if data is None else observation_from_bytes(data)
+
+    def drive(self, action: DrivingAction, controlled: BoolArray) -> None:
+        """Let the step be made."""
+        self.answer(action_bytes(action, controlled))

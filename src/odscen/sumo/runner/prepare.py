@@ -6,13 +6,16 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from odscen.runs.layout import BEHAVIOUR_FILE
+from odscen.base.errors import InputError
+from odscen.runs.layout import BEHAVIOUR_FILE, LIGHT_STAGES_FILE
 from odscen.runs.run_settings import AS_DESIGNED
 from odscen.scenario.document.json_form import dumps
+from odscen.sumo.realize.lights.light_stages import lights_json, switched_lights
 from odscen.sumo.realize.realization import realize
 from odscen.sumo.realize.sumo_lane_places import lane_places
 from odscen.sumo.runner.forecast import forecast
 from odscen.sumo.runner.run_folder import SumoPreparedRun
+from odscen.sumo.worker.behaviour.behaviour_doors import door_switches_lights
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,12 +67,14 @@ def prepare(
     ------
     ScenarioError
         With every actor and flow whose spawn or goal is not usable.
+    InputError
+        If a model is to switch lights where there is none to switch.
     """
     realization = realize(scenario, sumo_map, assets, settings=settings, assigned=assigned)
     plan = realization.plan
     return SumoPreparedRun(
         plan=plan,
-        sumo_files=_with_behaviour(realization.files, settings.behaviour),
+        sumo_files=_with_behaviour(realization.files, settings.behaviour, scenario, sumo_map),
         net=net,
         settings=settings,
         scenario_json=dumps(scenario),
@@ -100,9 +105,20 @@ def _describe_driver(door: BehaviourDoor | None) -> dict[str, Any]:
     return {"behaviour": door.shown, "behaviour_options": dict(door.options)}
 
 
-def _with_behaviour(files: Mapping[str, str], door: BehaviourDoor | None) -> Mapping[str, str]:
-    """SUMO's files, and what drives instead of it."""
+def _with_behaviour(
+    files: Mapping[str, str], door: BehaviourDoor | None, scenario: Scenario, sumo_map: SumoMap
+) -> Mapping[str, str]:
+    """SUMO's files, and what drives or switches lights instead of it."""
     if door is None:
         return files
     said = {name: value for name, value in asdict(door).items() if value is not None}
-    return {**files, BEHAVIOUR_FILE: json.dumps(said, indent=2) + "\n"}
+    files = {**files, BEHAVIOUR_FILE: json.dumps(said, indent=2) + "\n"}
+    if not door_switches_lights(door):
+        return files
+    lights = switched_lights(scenario, sumo_map)
+    if not lights:
+        raise InputError(
+            f"it switches lights, and map {scenario.map.name!r} has none with two stages or more",
+            element=door.shown,
+        )
+    return {**files, LIGHT_STAGES_FILE: lights_json(lights)}

@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
+    from odscen.sumo.worker.behaviour.light_run import LightRun
     from odscen.sumo.worker.story.story_run import StoryRun
 
 FAILED = 3
@@ -210,12 +211,14 @@ def simulate(
 def _open_stepper(
     plan: Plan, folder: Path, send: Send, watch: Watch | LockstepWatch | None
 ) -> Iterator[Stepper]:
-    stepper = Stepper(plan, send, watch, _open_story(plan, folder), _open_behaviour(plan, folder))
+    behaviour, lights = _open_behaviour(plan, folder)
+    stepper = Stepper(plan, send, watch, _open_story(plan, folder), behaviour, lights)
     try:
         yield stepper
     finally:
-        if stepper.behaviour is not None:
-            stepper.behaviour.close()
+        opened = behaviour or lights  # one model, which is told once
+        if opened is not None:
+            opened.close()
 
 
 def _open_story(plan: Plan, folder: Path) -> StoryRun | None:
@@ -227,13 +230,13 @@ def _open_story(plan: Plan, folder: Path) -> StoryRun | None:
     return StoryRun.in_folder(folder, plan)
 
 
-def _open_behaviour(plan: Plan, folder: Path) -> BehaviourRun | None:
-    """What drives instead of SUMO; without it, nothing of it is imported."""
+def _open_behaviour(plan: Plan, folder: Path) -> tuple[BehaviourRun | None, LightRun | None]:
+    """What drives, and what switches lights; without any, nothing of it is imported."""
     if not (folder / SUMO_FOLDER / BEHAVIOUR_FILE).is_file():
-        return None
-    from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
+        return None, None
+    from odscen.sumo.worker.behaviour.opened_model import open_model
 
-    return BehaviourRun.in_folder(folder, plan)
+    return open_model(folder, plan)
 
 
 def _begin_anew(following: Sequence[str]) -> None:

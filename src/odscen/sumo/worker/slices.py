@@ -68,6 +68,8 @@ def run_slice(plan: Plan, run: Path, stepper: Stepper, completion: Completion) -
             stepper.story.restore(done.story)
         if stepper.behaviour is not None:
             stepper.behaviour.restore(done.driven)
+        if stepper.lights is not None:
+            stepper.lights.restore(done.lights)
     routes = RouteSlices(run / layout.SUMO_FOLDER / layout.ROUTES_FILE)
     if done is None or not done.last:
         written = _RunningSlice(plan, run, done, routes).run(stepper)
@@ -134,6 +136,7 @@ class _RunningSlice:
             files={},
             story={} if stepper.story is None else stepper.story.state(),
             driven=[] if stepper.behaviour is None else stepper.behaviour.state(),
+            lights={} if stepper.lights is None else stepper.lights.state(),
         )
         parked = frozenset(before.recorder["parked"]) if before else frozenset()
         return WrittenSlice(

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from odscen.records.run_plan import Plan
     from odscen.sumo.worker.behaviour.behaviour_run import BehaviourRun
+    from odscen.sumo.worker.behaviour.light_run import LightRun
     from odscen.sumo.worker.protocol import Message
     from odscen.sumo.worker.simulation.session import Session
     from odscen.sumo.worker.story.story_run import StoryRun
@@ -50,6 +51,8 @@ class Stepper:
         The rules of the run, if it has any.
     behaviour
         What drives vehicles instead of SUMO, if anything does.
+    lights
+        What switches lights instead of their programs, if anything does.
     """
 
     def __init__(
@@ -59,9 +62,11 @@ class Stepper:
         watch: Watch | LockstepWatch | None,
         story: StoryRun | None = None,
         behaviour: BehaviourRun | None = None,
+        lights: LightRun | None = None,
     ) -> None:
         self.story = story
         self.behaviour = behaviour
+        self.lights = lights
         self.recorder = Recorder(plan)
         self.steps = 0
         self._plan = plan
@@ -151,6 +156,8 @@ class Stepper:
             recorder.add(self._diversions.before_step(session, now, self._plan.step_length))
         if self._missed_lanes.due(now, self._plan.step_length):
             self._change_routes(session, now)
+        if self.lights is not None:
+            self.lights.before_step(session)
         if self.behaviour is not None:
             self.behaviour.before_step(session, self._moved_by_others())
         else:

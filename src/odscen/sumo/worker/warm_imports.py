@@ -29,4 +29,4 @@ def import_for(folder: Path, *, watched: bool = False) -> None:
     if (folder / SUMO_FOLDER / STORY_FILE).is_file():
         import odscen.sumo.worker.story.story_run
     if (folder / SUMO_FOLDER / BEHAVIOUR_FILE).is_file():
-        import odscen.sumo.worker.behaviour.behaviour_run  # noqa: F401
+        import odscen.sumo.worker.behaviour.opened_model  # noqa: F401

@@ -91,3 +91,30 @@ class Misdescribed(Nobody):
     """Offers an option, but not as a property of an object."""
 
     options: Any = {"gap": {"type": "number"}}  # noqa: RUF012 - as people write it
+
+
+class Stubborn:
+    """Switches lights: every light to a stage, from the first second on."""
+
+    interval = 1.0
+
+    def __init__(self, stage: float = 0.0) -> None:
+        self.stage = int(stage)
+
+    def init_lights(self, rng: Any, scene: Any) -> Any:
+        del rng
+        return scene
+
+    def switch(self, seen: Any, state: Any) -> Any:
+        del seen
+        return [self.stage] * len(state.lights)
+
+
+class InTurn(Stubborn):
+    """Switches each light to its next stage as soon as it may."""
+
+    def switch(self, seen: Any, state: Any) -> Any:
+        return [
+            (light.stage + 1) % len(facts.stages)
+            for facts, light in zip(state.lights, seen.lights, strict=True)
+        ]

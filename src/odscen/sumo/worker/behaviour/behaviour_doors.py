@@ -26,7 +26,7 @@ import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import InputError, NotFoundError
+from odscen.base.errors import InputError, NotFoundError, OdscenError
 from odscen.learning.behaviour.behaviour_messages import (
     HEAD,
     MOST_BYTES,
@@ -76,27 +76,38 @@ class _Peer:
     def init(self, rng: np.random.Generator, scene: BehaviourScene) -> None:
         """Start it, and tell it the scene."""
         del rng  # it has the seed
-        self._open_connection()
-        os.set_blocking(self._to, False)
-        os.set_blocking(self._back, False)
-        self._ask_peer(scene_bytes(scene, self._seed))
+        self.open_connection()
+        self.ask(scene_bytes(scene, self._seed))
 
     def act(self, observation: RoadObservation, state: Any) -> tuple[DrivingAction, BoolArray]:
         """Ask it."""
         del state
-        return action_from_bytes(self._ask_peer(observation_bytes(observation)), len(observation))
+        return action_from_bytes(self.ask(observation_bytes(observation)), len(observation))
 
     def close(self) -> None:
         """Say that the run is over."""
 
-    def _open_connection(self) -> None:
+    def open_connection(self) -> None:
+        """Start it, or call it."""
+        self._connect()
+        os.set_blocking(self._to, False)
+        os.set_blocking(self._back, False)
+
+    def _connect(self) -> None:
         raise NotImplementedError
 
     def _explain_end(self) -> str:
         """Why it has ended."""
         raise NotImplementedError
 
-    def _ask_peer(self, message: bytes) -> bytes:
+    def ask(self, message: bytes) -> bytes:
+        """Send a message, and wait for the answer.
+
+        Raises
+        ------
+        InputError
+            If it has ended, takes too long, or its answer is too large.
+        """
         end = time.monotonic() + self._time_limit
         self._write_all(framed(message), end)
         size = HEAD.unpack(self._read_all(HEAD.size, end))[0]
@@ -147,7 +158,7 @@ class PipedDriver(_Peer):
         self._process: subprocess.Popen[bytes] | None = None
         self._said: BinaryIO
 
-    def _open_connection(self) -> None:
+    def _connect(self) -> None:
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
         try:
             self._process = subprocess.Popen(
@@ -195,7 +206,7 @@ class SocketDriver(_Peer):
         self._path = path
         self._socket: socket.socket
 
-    def _open_connection(self) -> None:
+    def _connect(self) -> None:
         self._socket = socket.socket(socket.AF_UNIX)
         try:
             self._socket.connect(self._path)
@@ -216,8 +227,10 @@ class SocketDriver(_Peer):
 GROUP = "odscen.behaviour"
 """Of entry points."""
 IDM, IMITATION = "idm", "imitation"
-"""Names of the models that ship."""
-_SHIPPED = IDM, IMITATION
+MAX_PRESSURE, SIGNAL_AGENT = "max-pressure", "signal-agent"
+"""Names of the models that ship; the last two switch lights."""
+_SHIPPED = IDM, IMITATION, MAX_PRESSURE
+"""Those that need no file."""
 
 
 def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
@@ -247,13 +260,37 @@ def open_behaviour(door: BehaviourDoor, seed: int) -> BehaviourModel:
     options = values_for(found, door.options, name=name, others=True)
     try:
         made = found(**options) if isinstance(found, type) else found
+    except OdscenError:
+        raise
     except Exception as error:  # whatever code from outside may raise
         raise InputError(f"it cannot be made: {error!r}", element=name) from error
-    for method in ("init(rng, scene)", "act(observation, state)"):
+    if switches_lights(made) and not callable(getattr(made, "act", None)):
+        wanted: tuple[str, ...] = ("init_lights(rng, scene)", "switch(observation, state)")
+    else:
+        wanted = ("init(rng, scene)", "act(observation, state)")
+    for method in wanted:
         if not callable(getattr(made, method.partition("(")[0], None)):
             raise InputError(f"it has no method `{method}`", element=name)
     model: BehaviourModel = made
     return model
+
+
+def switches_lights(model: Any) -> bool:
+    """Whether a model, or its class, chooses stages of traffic lights."""
+    return callable(getattr(model, "switch", None))
+
+
+def door_switches_lights(door: BehaviourDoor | None) -> bool:
+    """Whether what a door leads to chooses stages of traffic lights; programs do not.
+
+    Raises
+    ------
+    InputError
+        If it cannot be imported.
+    """
+    return (
+        door is not None and door.name is not None and switches_lights(_find_behaviour(door.name))
+    )
 
 
 def read_behaviour(text: str) -> BehaviourDoor:
@@ -317,5 +354,13 @@ def _find_behaviour(name: str) -> Any:
         from odscen.learning.behaviour.imitation_driver import ImitationDriver
 
         return ImitationDriver
-    shipped = f"{IDM!r} and {IMITATION!r} ship"
+    if name == MAX_PRESSURE:
+        from odscen.learning.behaviour.max_pressure import MaxPressure
+
+        return MaxPressure
+    if name == SIGNAL_AGENT:
+        from odscen.learning.behaviour.signal_agent import SignalAgentModel
+
+        return SignalAgentModel
+    shipped = f"{', '.join(map(repr, _SHIPPED))} and {SIGNAL_AGENT!r} ship"
     return named_object(name, group=GROUP, what="behaviour", shipped=shipped)

@@ -11,14 +11,11 @@ import numpy as np
 from odscen.base.errors import InputError, OdscenError, SimulationError
 from odscen.base.frames import angle_deg_from_hdg
 from odscen.learning.behaviour.behaviour_model import CheckedAction, DrivingKind
-from odscen.runs.layout import BEHAVIOUR_FILE, SUMO_FOLDER
 from odscen.scenario.document.distributions import stream
-from odscen.sumo.worker.behaviour.behaviour_doors import open_behaviour, read_behaviour
 from odscen.sumo.worker.behaviour.road_sight import RoadSight
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
-    from pathlib import Path
 
     from odscen.base.arrays import FloatArray, Int32Array, IntArray
     from odscen.learning.behaviour.behaviour_model import BehaviourModel
@@ -51,19 +48,6 @@ class BehaviourRun:
         self._names: list[str] = []
         self._mode: IntArray  # of each vehicle of the scene, 0 if SUMO drives it
         self._speed: FloatArray  # that was last set, NaN if none was
-
-    @classmethod
-    def in_folder(cls, run: Path, plan: Plan) -> BehaviourRun:
-        """The model of the run in a folder.
-
-        Raises
-        ------
-        InputError
-            If it cannot be made.
-        """
-        text = (run / SUMO_FOLDER / BEHAVIOUR_FILE).read_text(encoding="utf-8")
-        door = read_behaviour(text)
-        return cls(open_behaviour(door, plan.seed), plan, door.shown)
 
     def before_step(self, session: Session, taken: Collection[str]) -> None:
         """Let the model drive in the step that comes.

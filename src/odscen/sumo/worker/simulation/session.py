@@ -29,6 +29,7 @@ from odscen.sumo.worker.simulation.placed_vehicles import Placing
 from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 from odscen.sumo.worker.simulation.stop_doors import StopDoors
 from odscen.sumo.worker.simulation.stopped_vehicles import StoppedVehicles
+from odscen.sumo.worker.simulation.switched_lights import SwitchedLights
 from odscen.sumo.worker.simulation.turning_gaps import TurningGaps
 
 if TYPE_CHECKING:
@@ -277,6 +278,10 @@ class Session:
         """Hand of behaviour models on all vehicles."""
         native = partial(_native_function, self._sumo)
         return DrivenVehicles(self._sumo, self._errors, native, self.lanes)
+
+    def switched_lights(self) -> SwitchedLights:
+        """Hand of models that switch lights."""
+        return SwitchedLights(self._sumo)
 
     def vehicles_by_lane(self) -> dict[str, int]:
         """How many vehicles have their front on each lane, of those that have any."""
