@@ -72,7 +72,7 @@ class _LightEpisodes:
         )
         self.seen = self._run.see()
         if self.seen is None:
-            raise InputError("the run is over before its first choice: nobody is on the road")
+            raise InputError("the run is over before its first choice: it has no road users")
 
     def go_on(self, stages: list[int]) -> LightsObservation | None:
         """Switch, and wait for the next choice; ``None`` once the run is over."""
