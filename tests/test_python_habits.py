@@ -60,6 +60,23 @@ def test_all_paths_may_be_text(workspace: odscen.Workspace, tmp_path: Path) -> N
     assert editing.save(str(tmp_path / "edited.scenario.json")).is_file()
 
 
+def test_learners_and_demand_take_text_for_paths_too(
+    workspace: odscen.Workspace, graph: MapGraph, tmp_path: Path
+) -> None:
+    from odscen import demand, edit, learn
+
+    with pytest.raises(odscen.InputError, match=rf"{re.escape(str(tmp_path))}: no \*"):
+        learn.read_shards(str(tmp_path))
+    missing = str(tmp_path / "none.npz")
+    with pytest.raises(odscen.InputError, match=r"none\.npz"):
+        learn.read_model(missing)
+    scenario = edit.new_scenario(graph, name="empty", roi=graph.segments.ids)
+    with pytest.raises(odscen.InputError, match=r"none\.npz"):
+        demand.import_traffic(workspace, scenario, missing, stations=missing)
+    with pytest.raises(odscen.InputError, match="nothing is left to learn from"):
+        learn.learn_driving(workspace, [], str(tmp_path / "driver.npz"))
+
+
 def test_the_home_folder_is_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """``~`` is what it is in a shell."""
     monkeypatch.setenv("HOME", str(tmp_path))

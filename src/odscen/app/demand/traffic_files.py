@@ -13,7 +13,7 @@ from odscen.app.demand.map_stations import MapPlace, StationFinder
 from odscen.app.maps import map_of
 from odscen.base.checksums import digest
 from odscen.base.errors import InputError, in_file
-from odscen.base.given_files import read_given
+from odscen.base.given_files import as_path, read_given
 from odscen.base.shown import some_of
 from odscen.base.text_files import write_text
 from odscen.formats.office.free_table import iterate_titles
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.given_files import GivenPath
     from odscen.formats.office.free_table import GivenTable
     from odscen.formats.office.traffic_file import (
         LeftOut,
@@ -113,9 +114,9 @@ class TrafficReport:
 def import_traffic(
     workspace: Workspace,
     scenario: Scenario,
-    file: Path,
+    file: GivenPath,
     *,
-    stations: Path | None = None,
+    stations: GivenPath | None = None,
     options: ReadingOptions = DEFAULT,
     name: str | None = None,
     use: Literal["generate", "compare"] = "generate",
@@ -148,11 +149,11 @@ def import_traffic(
     places: Mapping[str, StationPlace] = {}
     if stations is not None:
         with in_file(str(stations)):
-            places = read_traffic(read_given(stations)).stations
+            places = read_traffic(read_given(as_path(stations))).stations
             if not places:
                 raise InputError("this file says of no station where it is")
     with in_file(str(file)):
-        read = read_traffic(read_given(file), options=options, known_columns=kept.of)
+        read = read_traffic(read_given(as_path(file)), options=options, known_columns=kept.of)
         changed, report = put_traffic(
             loaded, scenario, read, places=places, name=name, use=use, **fields
         )

@@ -12,6 +12,7 @@ from odscen.app.running.batches import run_all
 from odscen.app.running.runs import check_run
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, SimulationError
+from odscen.base.given_files import as_path
 from odscen.base.text_files import write_file
 from odscen.base.version import __version__
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
@@ -24,9 +25,9 @@ from odscen.scenario.document.distributions import stream
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from odscen.base.arrays import FloatArray
+    from odscen.base.given_files import GivenPath
     from odscen.learning.fill import Array
     from odscen.maps.store import Workspace
 
@@ -50,7 +51,7 @@ class DrivingError(NamedTuple):
 def learn_driving(
     workspace: Workspace,
     maps: Sequence[str],
-    out: Path,
+    out: GivenPath,
     *,
     hold_out: Sequence[str] = (),
     runs: int = 3,
@@ -92,7 +93,7 @@ def learn_driving(
     x, acceleration = (np.concatenate([row[k] for row in rows]) for k in (0, 1))
     network = learned_driver(x, acceleration, np.random.default_rng(seed))
     about = {"maps": kept, "runs": runs, "rows": len(x), "seed": seed, "odscen": __version__}
-    write_file(out, network_bytes(network, about))
+    write_file(as_path(out), network_bytes(network, about))
     measured = [name for name in maps if name not in kept] or kept
     found = []
     for name in measured:

@@ -14,7 +14,6 @@ from odscen.learning.reference.traffic_model import model_bytes, model_from_byte
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from odscen.base.given_files import GivenPath
     from odscen.learning.reference.traffic_model import TrafficModel
@@ -49,7 +48,7 @@ def train(
     NotFoundError
         If the workspace lacks one of the maps.
     """
-    shards = read_shards(as_path(data))
+    shards = read_shards(data)
     model = train_on(workspace, kept(shards, hold_out), settings=settings, told=told)
     write_file(as_path(out), model_bytes(model))
     return model
@@ -90,7 +89,7 @@ def kept(shards: Sequence[Shard], hold_out: Sequence[str]) -> list[Shard]:
     return [shard for shard in shards if shard.town not in hold_out]
 
 
-def read_model(file: Path) -> TrafficModel:
+def read_model(file: GivenPath) -> TrafficModel:
     """Read a model.
 
     Raises
@@ -98,4 +97,4 @@ def read_model(file: Path) -> TrafficModel:
     InputError
         If it cannot be read, or is none.
     """
-    return model_from_bytes(read_given(file), file=str(file))
+    return model_from_bytes(read_given(as_path(file)), file=str(file))

@@ -205,7 +205,7 @@ def make_shards(
     return made
 
 
-def read_shards(folder: Path) -> list[Shard]:
+def read_shards(folder: GivenPath) -> list[Shard]:
     """Read all shards of a folder, in the order of their names.
 
     Raises
@@ -213,6 +213,7 @@ def read_shards(folder: Path) -> list[Shard]:
     InputError
         If there are none, or one cannot be read.
     """
+    folder = as_path(folder)
     files = sorted(folder.glob(f"*{SUFFIX}"))
     if not files:
         raise InputError(
