@@ -14,7 +14,7 @@ MODULES := frontend/node_modules/.package-lock.json
 unexport PYTHONDONTWRITEBYTECODE
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test test-interchange test-interchange-part fuzz regression test-page chromium allocator page api check docs hooks format bench golden maps large-town check-maps check-wheel test-lowest test-newest screenshots clean
+.PHONY: demo test test-interchange test-interchange-part fuzz regression test-page chromium allocator page api api-changes check docs hooks format bench golden maps large-town check-maps check-wheel test-lowest test-newest screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
@@ -67,6 +67,10 @@ check: $(READY) $(MODULES)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# What of the public API would break for users of REF, the last release if not given; see docs/api.md.
+api-changes: $(READY)
+	$(BIN)/python -m tools.api_changes $(REF)
 
 # The documentation as a site in build/site; a broken link or anchor is an error.
 docs: $(DOCS)
