@@ -63,3 +63,19 @@ def test_tests_lie_where_their_rooms_lie() -> None:
         and room.as_posix() not in others
     ]
     assert strays == []
+
+
+def test_one_module_alone_makes_folders_in_that_of_everybody() -> None:
+    """They are their user's alone, and what is left of them after a kill is removed.
+
+    What has no name, ``TemporaryFile``, needs neither.
+    """
+    by_name = {"TemporaryDirectory", "NamedTemporaryFile", "gettempdir", "mkdtemp", "mkstemp"}
+    makers = {
+        name
+        for name, path in MODULES.items()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if (isinstance(node, ast.Attribute) and node.attr in by_name)
+        or (isinstance(node, ast.alias) and node.name in by_name)
+    }
+    assert makers == {"odscen.base.atomic_folders"}

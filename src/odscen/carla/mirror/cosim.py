@@ -7,10 +7,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, ClassVar
 
 from odscen.app.running.runs import carry_out, check_file, prepare_run
+from odscen.base.atomic_folders import passing_folder
 from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.mirror.cosim_report import CosimReport
 from odscen.carla.mirror.mirrored import MirroredPlan
@@ -124,8 +124,9 @@ class RunWitnesses:
     def _attach_sensors(
         self, stack: ExitStack, folder: Path, options: CosimOptions, show: StepShow
     ) -> None:
-        staging = stack.enter_context(TemporaryDirectory(dir=folder.parent, prefix=".sensors-"))
-        self._seen = Path(staging) / layout.SENSORS_FOLDER
+        # Of one that is killed the next run removes it.
+        staging = stack.enter_context(passing_folder(folder.parent))
+        self._seen = staging / layout.SENSORS_FOLDER
         self._sensors = SensorRecording(self._server, options.sensors, self._seen)
         stack.callback(self._sensors.detach)
         show.witnesses.append(partial(self._sense_from_ego, self._sensors))
