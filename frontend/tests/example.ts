@@ -86,6 +86,7 @@ export const scenario = (actors: Actor[], roi = ["a"], flows: Flow[] = []): Scen
     lateral_resolution: null,
     teleport_after: 300,
     pedestrians: "striping",
+    after_story: "auto",
   },
   study: { warm_up: 0, interval: null, detectors: [], sections: [], cordons: [] },
   rules: [],

@@ -27,6 +27,7 @@ export const summary = (
   map: "m",
   map_sha256: null,
   meso: false,
+  scene: false,
   driven_by: null,
   behaviour: null,
   behaviour_options: {},

@@ -80,11 +80,14 @@ def document(
     until: float = 20.0,
     **parts: Any,
 ) -> Scenario:
+    """Make a scenario that runs until ``until``, whatever its story does."""
     graph = loaded(name).sumo.graph
     empty = edits.new_scenario(graph, name="story", roi=graph.segments.ids)
     data = json.loads(dumps(empty))
     data["actors"], data["rules"] = actors, rules
-    data["simulation"] = {"duration": until} | ({} if step is None else {"step_length": step})
+    data["simulation"] = {"duration": until, "after_story": "never"} | (
+        {} if step is None else {"step_length": step}
+    )
     return loads(json.dumps(data | parts))
 
 

@@ -2002,10 +2002,11 @@ export interface components {
          *     ``route_changed``: it did not get to the lane that its route needed, and took another one.
          *     Measures begin and end; their id stands for that of an actor.
          *     What a rule does is reported of its actor, at the instant, which may lie inside a step;
-         *     ``rule_acted`` is what no motion follows from, such as lights.
+         *     ``rule_acted`` is what no motion follows from, such as lights. ``story_ended``: no rule is under
+         *     way and none can fire any more; ``story`` stands for the actor.
          * @enum {string}
          */
-        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "route_changed" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden";
+        EventKind: "departed" | "arrived" | "teleport_start" | "teleport_end" | "collision" | "emergency_stop" | "jam_begin" | "jam_end" | "lost" | "stranded" | "route_changed" | "measure_begin" | "measure_end" | "rule_started" | "rule_acted" | "rule_ended" | "rule_failed" | "rule_overridden" | "story_ended";
         /** @description An expectation, what came of it, and whether it was met. */
         ExpectationInfo: {
             expectation: string;
@@ -3805,6 +3806,8 @@ export interface components {
             map_sha256: string | null;
             /** @default false */
             meso: boolean;
+            /** @default false */
+            scene: boolean;
             driven_by: string | null;
             behaviour: string | null;
             behaviour_options: {
@@ -3926,7 +3929,8 @@ export interface components {
              *       "duration": 600,
              *       "step_length": 0.5,
              *       "teleport_after": 300,
-             *       "pedestrians": "striping"
+             *       "pedestrians": "striping",
+             *       "after_story": "auto"
              *     }
              */
             simulation: components["schemas"]["Simulation"];
@@ -4477,6 +4481,7 @@ export interface components {
             teleport_after?: number;
             /** @enum {string} */
             pedestrians?: "striping" | "nonInteracting";
+            after_story?: number | ("auto" | "never");
         };
         /** @description Change fields of a stage of a program of the scenario's own, such as ``on_call``. */
         SetStageEdit: {
@@ -4785,6 +4790,8 @@ export interface components {
          *     ``lateral_resolution`` (metres) lets vehicles share a lane side by side, as two-wheelers do.
          *     ``teleport_after`` is how long the first vehicle of a lane may wait before SUMO teleports it; 0
          *     is never. ``pedestrians`` is SUMO's model: in ``striping`` they walk around each other.
+         *     ``after_story`` is how long the run goes on once its story has ended, in seconds; ``never``: it
+         *     goes on to its duration; ``auto``: :data:`AFTER_STORY` seconds in a scene, else ``never``.
          */
         Simulation: {
             /** @default 600 */
@@ -4800,6 +4807,8 @@ export interface components {
              * @enum {string}
              */
             pedestrians: "striping" | "nonInteracting";
+            /** @default auto */
+            after_story: number | ("auto" | "never");
         };
         /** @description A slice of a long run: its end, and what it took up to there; megabytes. */
         SliceInfo: {

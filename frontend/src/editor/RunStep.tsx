@@ -15,6 +15,8 @@ import { ModelChoice } from "./ModelChoice";
 import type { RunChoices } from "./runChoices";
 import { SimulatorChoice } from "./SimulatorChoice";
 
+/** Seconds after the end of the story at which the run of a scene ends, as on the server. */
+const AFTER_STORY = 10;
 const PACES = localized(() => [
   { value: "real", label: t`Real time` },
   { value: "fast", label: t`As fast as possible` },
@@ -25,6 +27,48 @@ const RECORDINGS = localized(() => [
   { value: "10", label: t`Every 10 seconds` },
   { value: "none", label: t`Nothing` },
 ]);
+
+/** When the run of a scenario with rules ends: some seconds after its story, or with its duration. */
+function StoryEnd({ document, onEdit }: { document: ScenarioDocument; onEdit: (edit: Edit) => void }) {
+  if (document.rules.length === 0) return null;
+  const { after_story: wanted } = document.simulation;
+  const after = (seconds: number): string => t`${seconds} s after the end of the story`;
+  const whole = t`after its duration`;
+  const scene = isScene(document);
+  const choices: [string, string][] = scene
+    ? [
+        ["auto", after(AFTER_STORY)],
+        ["never", whole],
+      ]
+    : [
+        ["auto", whole],
+        [String(AFTER_STORY), after(AFTER_STORY)],
+      ];
+  const known = choices.some(([value]) => value === String(wanted));
+  if (!known) choices.push([String(wanted), wanted === "never" ? whole : after(Number(wanted))]);
+  return (
+    <Select
+      label={t`The run ends`}
+      description={t`the story has ended when no rule can fire any more`}
+      inputWrapperOrder={["label", "input", "description"]}
+      data={choices.map(([value, label]) => ({ value, label }))}
+      value={String(wanted)}
+      allowDeselect={false}
+      onChange={(value) => {
+        if (value === null || value === String(wanted)) return;
+        const next = value === "auto" || value === "never" ? value : Number(value);
+        onEdit({ kind: "set_simulation", after_story: next });
+      }}
+    />
+  );
+}
+
+/** Whether a scenario has rules and no traffic, as on the server. */
+const isScene = ({ flows, demand, transit, sumo }: ScenarioDocument): boolean =>
+  flows.length === 0 &&
+  [demand.inputs, demand.matrices, demand.counts, demand.background].every((parts) => parts.length === 0) &&
+  transit.lines.length === 0 &&
+  sumo === null;
 
 /** What is started, its duration, what is recorded, and how fast it begins. */
 export function RunStep({
@@ -62,6 +106,7 @@ export function RunStep({
         seconds={duration}
         onCommit={(value) => onEdit({ kind: "set_simulation", duration: value })}
       />
+      <StoryEnd document={document} onEdit={onEdit} />
       {long && (
         <Text size="xs" c="dimmed">
           <Trans>

@@ -66,7 +66,8 @@ export function Result({
     <section aria-label={t`Result of the run`}>
       <Title order={2} size="h3">
         {TITLE()[info.state] ?? t`The run is finished`}
-        {verdict && `: ${served(verdict.level)}`}
+        {verdict &&
+          `: ${info.summary && isJudged(info.summary) ? passed(info.summary) : served(verdict.level)}`}
       </Title>
       {info.summary?.behaviour && (
         <Text size="sm" c="dimmed">
@@ -123,6 +124,14 @@ export function Result({
     </section>
   );
 }
+
+/** Whether a run is a scene that says itself when it has passed. */
+const isJudged = (summary: Summary): boolean => summary.scene && summary.criteria.length > 0;
+
+const passed = (summary: Summary): string =>
+  summary.usable?.level !== "not usable" && summary.criteria.every((one) => one.passed)
+    ? t`passed`
+    : t`not passed`;
 
 /** Why the figures below cannot be used, or only with care; nothing of a usable run. */
 function Reservations({ verdict }: { verdict: Verdict }) {

@@ -27,6 +27,7 @@ const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
   rule_ended: "rule",
   rule_failed: "rule",
   rule_overridden: "rule",
+  story_ended: "rule",
 };
 
 export const MARK_WORD = localized((): Record<MarkKind, string> => ({
@@ -82,6 +83,8 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
       return t`${who} could not do rule ${rule}: ${detail}`;
     case "rule_overridden":
       return t`${who} stopped rule ${rule}: ${detail}`;
+    case "story_ended":
+      return t`The story has ended`;
     default:
       return [who, incident.kind.replaceAll("_", " ")].filter(Boolean).join(": ");
   }

@@ -45,7 +45,16 @@ if TYPE_CHECKING:
     from odscen.runs.finished_run import Run
     from odscen.runs.reporter import Progress
     from odscen.runs.run_settings import RunSettings, SliceLength
+    from odscen.scenario.document.scenario_document import AfterStory
     from odscen.scenario.sampling.sampler import Redraw
+
+
+def _read_after_story(text: str | None) -> AfterStory | None:
+    """Read ``auto``, ``never`` or a duration."""
+    words: dict[str | None, AfterStory | None] = {
+        None: None, "auto": "auto", "never": "never", "0": 0.0,
+    }  # fmt: skip
+    return words[text] if text in words else duration(text or "")
 
 
 @contextmanager
@@ -90,6 +99,14 @@ def run(
     ] = None,
     step_length: Annotated[
         float | None, typer.Option(min=0.01, max=1, help="Seconds per step.")
+    ] = None,
+    after_story: Annotated[
+        str | None,
+        typer.Option(
+            help="How long a run goes on once its story has ended: seconds, never (to its "
+            "duration) or auto (10 s in a scene without traffic). (default: the scenario's own)",
+            metavar="[SECONDS|auto|never]",
+        ),
     ] = None,
     expect: Annotated[
         list[str] | None,
@@ -219,6 +236,7 @@ def run(
         warm_up=warm_up,
         interval=interval,
         behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout),
+        after_story=_read_after_story(after_story),
         simulator=simulator,
         simulator_options=option_settings(simulator_set or (), element="--simulator-set"),
     )

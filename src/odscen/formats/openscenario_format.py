@@ -164,6 +164,7 @@ def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) ->
     usual = Simulation(
         duration=scenario.simulation.duration,
         step_length=STEP_WITH_RULES if scenario.rules else Simulation().step_length,
+        after_story=scenario.simulation.after_story,
     )
     given = {
         "seed": scenario.seed > 0,

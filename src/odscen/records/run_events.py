@@ -32,7 +32,8 @@ class EventKind(StrEnum):
     ``route_changed``: it did not get to the lane that its route needed, and took another one.
     Measures begin and end; their id stands for that of an actor.
     What a rule does is reported of its actor, at the instant, which may lie inside a step;
-    ``rule_acted`` is what no motion follows from, such as lights.
+    ``rule_acted`` is what no motion follows from, such as lights. ``story_ended``: no rule is under
+    way and none can fire any more; ``story`` stands for the actor.
     """
 
     DEPARTED = "departed"
@@ -53,6 +54,7 @@ class EventKind(StrEnum):
     RULE_ENDED = "rule_ended"
     RULE_FAILED = "rule_failed"
     RULE_OVERRIDDEN = "rule_overridden"
+    STORY_ENDED = "story_ended"
 
 
 class Event(NamedTuple):

@@ -199,6 +199,12 @@ class Plan:
         Areas, where trips park.
     criteria
         Of the scenario: what must come out for the run to pass.
+    scene
+        Whether its rules and criteria are what it is about, and not traffic.
+    after_story
+        Seconds after the end of its story at which the run ends; ``None``: it goes on.
+    awaits
+        Actors who must have arrived before that, as criteria ask about their arrival.
     """
 
     scenario: str
@@ -218,6 +224,9 @@ class Plan:
     stations: tuple[PlannedStation, ...] = ()
     parking: tuple[PlannedParking, ...] = ()
     criteria: tuple[str, ...] = ()
+    scene: bool = False
+    after_story: float | None = None
+    awaits: tuple[str, ...] = ()
 
     def to_json(self) -> str:
         """One actor per line; the same plan gives the same text."""
@@ -244,7 +253,10 @@ class Plan:
         said["stations"] = [asdict(station) for station in self.stations]
         said["parking"] = [asdict(parking) for parking in self.parking]
         said["criteria"] = list(self.criteria)
+        said["scene"], said["awaits"] = self.scene, list(self.awaits)
         head |= {name: value for name, value in said.items() if value}
+        if self.after_story is not None:
+            head["after_story"] = self.after_story
         return json_with_rows(
             head, "actors", [without_defaults(actor, _DEFAULTS) for actor in self.actors]
         )
@@ -271,6 +283,7 @@ class Plan:
             data["stations"] = tuple(map(PlannedStation.from_dict, data.get("stations", ())))
             data["parking"] = tuple(map(_PLANNED_PARKING, data.get("parking", ())))
             data["criteria"] = tuple(data.get("criteria", ()))
+            data["awaits"] = tuple(data.get("awaits", ()))
             return _PLAN({key: data[key] for key in data.keys() - {"format", "version"}})
 
 

@@ -240,6 +240,8 @@ def _verdict_words(summary: Mapping[str, Any], usability: Usability) -> tuple[st
     kind = " and ".join(name for name, rows in asked.items() if rows)
     missed = sum(not row.get("passed") for row in expectations)
     words = usability.level.capitalize()
+    if summary.get("scene") and expectations and usability.level is not UsabilityLevel.NOT_USABLE:
+        words = "Not passed" if missed else "Passed"
     if missed:
         return "bad", f"{words}, {missed} of {len(expectations)} {kind} not met"
     style = _STYLES[usability.level]
@@ -626,6 +628,10 @@ EVENT_WORDS = {
         "stopped doing what a rule says",
         "Another rule acts on the same actor instead.",
     ),
+    EventKind.STORY_ENDED: (
+        "has ended",
+        "No rule can fire any more; the run ends as many seconds later as the scenario says.",
+    ),
 }
 """What happened and why that may be, for the events that are reported."""
 
@@ -672,7 +678,7 @@ def _event_row(event: Event) -> _EventRow:
     if event.kind is EventKind.COLLISION and event.values:
         words += f", {number(event.values.get('impact_speed', 0.0), 1)} m/s faster"
     if event.detail:
-        of_rule = event.kind is EventKind.RULE_FAILED or event.rule
+        of_rule = event.kind in (EventKind.RULE_FAILED, EventKind.STORY_ENDED) or event.rule
         detail = event.detail if of_rule else reason_label(stop_reason(event.detail))
         words += f" ({detail})"
     time = number(event.time, 2 if event.rule else 1)

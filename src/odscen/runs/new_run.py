@@ -253,6 +253,7 @@ def make_summary(
         "seed": plan.seed,
         "until": plan.until,
         "step_length": plan.step_length,
+        **({"scene": True} if plan.scene else {}),
         "sim_seconds": seconds,
         "steps": outcome.steps,
         "wall_seconds": round(wall_seconds, 3),
@@ -276,7 +277,7 @@ def make_summary(
         incidents = find_incidents(plan, outcomes, events, end=seconds)
         summary["gridlock"] = incident_summary(incidents)
         until = plan.until if outcome.stopped else None
-        verdict = run_usability(outcomes, incidents, end=seconds, until=until)
+        verdict = run_usability(outcomes, incidents, end=seconds, until=until, scene=plan.scene)
         summary["usable"] = (failed_run(outcome.error) if outcome.error else verdict).to_dict()
     records = read_judged(folder) if known and judged else RunRecords()
     if plan.criteria:

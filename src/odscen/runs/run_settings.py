@@ -12,13 +12,14 @@ from odscen.figures.judging.criteria import criteria_of
 from odscen.figures.judging.expectations import Expectation, needs_criticality, parse_expectation
 from odscen.learning.behaviour.behaviour_model import BehaviourDoor
 from odscen.runs.recording import Recording
+from odscen.scenario.document.scenario_document import AFTER_STORY
 from odscen.scenario.sampling.sampler import REDRAWS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from odscen.learning.offered_options import OptionValue
-    from odscen.scenario.document.scenario_document import Scenario
+    from odscen.scenario.document.scenario_document import AfterStory, Scenario
     from odscen.scenario.sampling.sampler import Redraw
 
 SliceLength = float | Literal["auto"] | None
@@ -81,6 +82,9 @@ class RunSettings:
         Of figures over time, in whole seconds; the scenario's own if ``None``.
     behaviour
         What drives vehicles instead of SUMO; ``None``: nothing does.
+    after_story
+        Simulated time for which the run goes on once its story has ended, ``never`` for all of its
+        duration, ``auto`` for what suits the scenario; the scenario's own if ``None``.
     simulator, simulator_options
         Name of what plays the scenario, see :mod:`odscen.simulators.installed`, and its options.
 
@@ -103,6 +107,7 @@ class RunSettings:
     warm_up: float | None = None
     interval: float | None = None
     behaviour: BehaviourDoor | None = None
+    after_story: AfterStory | None = None
     simulator: str = "sumo"
     simulator_options: Mapping[str, OptionValue] = field(default_factory=dict)
 
@@ -125,6 +130,11 @@ class RunSettings:
         if self.slice_length != "auto":
             _refuse_time("slice_length", self.slice_length)
         _refuse_time("time_limit", self.time_limit)
+        if self.after_story not in (None, "auto", "never"):
+            need = "a number of seconds, 'auto' or 'never'"
+            _refuse_other_type("after_story", self.after_story, (int, float), need)
+            if not 0 <= float(self.after_story) <= _LONGEST:
+                raise InputError(f"after_story must be at least 0 s, not {self.after_story:g}")
         for name, seconds in (("warm_up", self.warm_up), ("interval", self.interval)):
             _refuse_other_type(name, seconds, (int, float), "whole seconds")
             if seconds is not None and (seconds < 0 or seconds % 1.0 or not math.isfinite(seconds)):
@@ -167,6 +177,14 @@ class RunSettings:
             )
         return until, step_length
 
+    def settle_time(self, scenario: Scenario) -> float | None:
+        """Seconds for which a run goes on once its story has ended; ``None``: to its end."""
+        own = scenario.simulation.after_story
+        wanted = own if self.after_story is None else self.after_story
+        if wanted == "auto":
+            wanted = AFTER_STORY if scenario.is_scene else "never"
+        return None if wanted == "never" or self.meso else float(wanted)
+
     def analysis(self, scenario: Scenario) -> AnalysisTimes:
         """What of a run of a scenario is analysed.
 
@@ -187,6 +205,8 @@ class RunSettings:
             **asdict(self),
             "expectations": [expectation.text for expectation in self.expectations],
         }
+        if self.after_story is None:
+            del values["after_story"]
         if self.simulator == "sumo":
             del values["simulator"], values["simulator_options"]
         return values

@@ -21,6 +21,28 @@ def criteria_of(texts: Sequence[str]) -> tuple[Expectation, ...]:
     return tuple(map(parse_expectation, texts))
 
 
+_AT_ANY_TIME = frozenset(
+    {"collided", "emergency_stopped", "teleported", "inserted", "planned", "departed"}
+    | {"min_ttc", "min_pet", "max_drac", "serious_conflicts", "conflicts", "usable", "criteria"}
+)
+"""Figures of a run that do not wait for arrivals."""
+_ON_ARRIVAL = frozenset({"arrived", "mean_speed", "travel_time", "delay"})
+"""Measures of an actor that it has when it has arrived."""
+
+
+def awaited_actors(wanted: Sequence[Expectation], scenario: Scenario) -> tuple[str, ...]:
+    """Actors about whose arrival something is asked, in the order of the document."""
+    names: set[str] = set()
+    for expectation in wanted:
+        if expectation.actor is None and expectation.name not in _AT_ANY_TIME:
+            names.update(actor.id for actor in scenario.actors)
+        elif expectation.name in _ON_ARRIVAL:
+            known = [actor.id for actor in scenario.actors if actor.id == expectation.actor]
+            egos = [actor.id for actor in scenario.actors if actor.ego]
+            names.update(known or (egos if expectation.actor == EGO else ()))
+    return tuple(actor.id for actor in scenario.actors if actor.id in names)
+
+
 def criteria_problems(scenario: Scenario) -> tuple[Problem, ...]:
     """Find criteria that cannot be judged: other words than those of figures, unknown actors."""
     return tuple(_find_problems(scenario))

@@ -146,6 +146,7 @@ def run_usability(
     *,
     end: float,
     until: float | None = None,
+    scene: bool = False,
 ) -> Usability:
     """Judge a run that has ended.
 
@@ -159,13 +160,17 @@ def run_usability(
         When the run ended, simulated seconds. Who was to depart later is not missed.
     until
         When it was to end, if it was stopped by hand.
+    scene
+        Whether it is judged by its criteria: who stands before a pedestrian is no jam, and who has
+        not arrived when the story ends is not late. Who was not inserted, or was teleported, has
+        not done what the scene says.
     """
     found = [
-        _judge_gridlock(incidents, end),
+        None if scene else _judge_gridlock(incidents, end),
         _not_inserted(outcomes, incidents, end),
         _judge_teleports(outcomes, incidents),
-        _not_served(outcomes, end),
-        _judge_latent_delay(outcomes, end),
+        None if scene else _not_served(outcomes, end),
+        None if scene else _judge_latent_delay(outcomes, end),
         None if until is None else _stopped_early(end, until),
     ]
     reasons = [

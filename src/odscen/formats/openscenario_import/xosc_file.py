@@ -127,7 +127,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
     positions.moving.update(entities)
     positions.begin_story()
     story.read(board)
-    duration = read_stop(report, board, story)
+    simulation = read_stop(report, board, story)
     data = {
         "name": name,
         "description": "" if story.own and _read_title(root) == name else _read_title(root),
@@ -136,7 +136,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
         "roi": list(largest_part(source.graph.segments)),
         "drivers": {"sets": [STEADY_DRIVER] if _any_steady(actors) else []},
         "actors": actors,
-        "simulation": {"duration": duration},
+        "simulation": simulation,
         "environment": found.environment,
         "demand": {"clock": found.clock or 0.0},
         "rules": [rule for rule in story.rules if rule["actor"] in init.placed],

@@ -153,6 +153,7 @@ def scenario_of_tracks(
                 "duration": round(last + later + _TAIL, 3),
                 "step_length": step,
                 "teleport_after": 0,
+                "after_story": "never",
             },
             "actors": actors,
             "rules": rules,

@@ -582,6 +582,11 @@ class Demand(Part):
         )
 
 
+AFTER_STORY = 10.0
+"""Seconds for which a scene goes on after its story has ended."""
+AfterStory = Annotated[float, Field(ge=0, le=1e6)] | Literal["auto", "never"]
+
+
 class Simulation(Part):
     """How the scenario is run unless the command says otherwise; seconds.
 
@@ -589,6 +594,8 @@ class Simulation(Part):
     ``lateral_resolution`` (metres) lets vehicles share a lane side by side, as two-wheelers do.
     ``teleport_after`` is how long the first vehicle of a lane may wait before SUMO teleports it; 0
     is never. ``pedestrians`` is SUMO's model: in ``striping`` they walk around each other.
+    ``after_story`` is how long the run goes on once its story has ended, in seconds; ``never``: it
+    goes on to its duration; ``auto``: :data:`AFTER_STORY` seconds in a scene, else ``never``.
     """
 
     duration: Annotated[float, Field(gt=0, le=1e9)] = 600.0
@@ -597,6 +604,7 @@ class Simulation(Part):
     lateral_resolution: Annotated[float, Field(ge=0.1, le=5)] | None = None
     teleport_after: Annotated[float, Field(ge=0, le=86_400)] = 300.0
     pedestrians: Literal["striping", "nonInteracting"] = "striping"
+    after_story: AfterStory = "auto"
 
 
 def _first_paragraph(schema: JsonDict) -> None:
@@ -696,6 +704,12 @@ class Scenario(Part):
     def by_story(self) -> tuple[Actor, ...]:
         """Actors whom the story alone drives unless a rule says otherwise."""
         return tuple(actor for actor in self.actors if actor.driver == "story")
+
+    @property
+    def is_scene(self) -> bool:
+        """Whether it has rules, or vehicles that the story alone drives, and no traffic."""
+        traffic = self.flows or self.demand.parts or self.transit.lines or self.sumo is not None
+        return bool(self.rules or self.by_story) and not traffic
 
     @model_validator(mode="after")
     def _fine_steps(self) -> Self:

@@ -23,6 +23,7 @@ from odscen.scenario.document.rules_document import actors_of, rule_parts
 from odscen.scenario.story.channels import ActingActor, CannotAct, Channel, WantedMove
 from odscen.scenario.story.condition_tree import CLOSE, NEVER_IN_STEP, ConditionTree
 from odscen.scenario.story.own_kinds import action_kind
+from odscen.scenario.story.story_end import longest_delay, story_has_ended
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -378,6 +379,19 @@ class StoryEngine:
         """Whether a rule can fire yet, or is about something."""
         state = self._states[rule]
         return state.item is not None or state.fired < self._rules[rule].times
+
+    @property
+    def has_rules(self) -> bool:
+        """Whether there are any."""
+        return bool(self._rules)
+
+    def has_ended(self, now: float, *, gone: Callable[[str], bool], still: bool) -> bool:
+        """Whether no rule is under way and none can fire any more, see :mod:`.story_end`."""
+        return story_has_ended(self._rules, self._states, now=now, gone=gone, still=still)
+
+    def longest_delay(self) -> float:
+        """Seconds after which a condition that has held may still let a rule fire."""
+        return longest_delay(self._rules, self._states)
 
     def step(self, view: RoadView) -> tuple[dict[str, WantedMove], list[StoryEvent]]:
         """Look at the road; what is wanted of whom until the next look, and what happened."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
+from odscen.figures.judging.criteria import awaited_actors, criteria_of
 from odscen.records.run_plan import Plan
 from odscen.runs.layout import (
     CLOSURES_FILE,
@@ -167,6 +168,8 @@ def realize(
         actors = tuple(
             sorted((*actors, *project.actors), key=lambda actor: (actor.depart, actor.id))
         )
+    settle = settings.settle_time(scenario)
+    wanted = (*criteria_of(scenario.criteria), *settings.expectations)
     plan = Plan(
         scenario=scenario.name,
         seed=scenario.seed,
@@ -187,6 +190,9 @@ def realize(
         stations=stations,
         parking=planned_parking(areas.values(), sumo_map),
         criteria=scenario.criteria,
+        scene=scenario.is_scene and not settings.meso,
+        after_story=settle,
+        awaits=() if settle is None else awaited_actors(wanted, scenario),
     )
     if settings.meso:
         scenario = scenario.model_copy(update={"signals": without_detectors(scenario.signals)})

@@ -84,6 +84,11 @@ class LockstepWatch:
         self._lights: dict[str, str] = {}
         self._lane: dict[str, int] = {"": -1}
 
+    @property
+    def drives(self) -> bool:
+        """Whether another program drives a vehicle, or may give rules."""
+        return self.rules or self.placed is not None
+
     def next_step(self, session: Session, recorder: Recorder) -> bool:
         """Tell of the step just made and obey until the next; false if the run is to stop."""
         self.show(session, recorder)

@@ -81,6 +81,8 @@ class Stepper:
         self._led = watch if isinstance(watch, LockstepWatch) and watch.rules else None
         if story is not None and (behaviour is not None or isinstance(watch, LockstepWatch)):
             story.look_always()
+        if story is not None and isinstance(watch, LockstepWatch) and watch.drives:
+            story.leave_end_open()
         self._due: float | None = None
         self._sent = 0.0
         self._start: tuple[float, int] | None = None
@@ -199,6 +201,7 @@ class Stepper:
 
             self.story = StoryRun.without_rules(self._plan)
             self.story.look_always()
+            self.story.leave_end_open()
             self.story.begin(session)
         while heard and self.story is not None:
             self.story.add(heard.pop(0))

@@ -100,6 +100,7 @@ class RunSummary(Answer):
     map: str | None = None
     map_sha256: str | None = None
     meso: bool = False
+    scene: bool = False
     driven_by: str | None = None
     behaviour: str | None = None
     behaviour_options: dict[str, OptionValue] = Field(default_factory=dict)

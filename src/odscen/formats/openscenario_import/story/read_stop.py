@@ -21,8 +21,11 @@ _CRITERION: Final = "criteria_"
 """How ScenarioRunner's names of conditions begin that are no triggers but judge a run."""
 
 
-def read_stop(report: ImportReport, board: _Element, story: StoryReader) -> float:
-    """Seconds after which the storyboard ends; other triggers of its end become rules."""
+def read_stop(report: ImportReport, board: _Element, story: StoryReader) -> Made:
+    """When the storyboard ends, as fields of ``simulation``; other triggers become rules.
+
+    A file that names a time runs until then, whether or not anything is left to happen.
+    """
     stop = report.child(board, "StopTrigger")
     found, latest, ends = [], 0.0, False
     for group in () if stop is None else report.children(stop, "ConditionGroup"):
@@ -41,12 +44,12 @@ def read_stop(report: ImportReport, board: _Element, story: StoryReader) -> floa
             found.append(min(seconds))
             report.mark(group, "approximated", "the run ends by time alone")
     if found := [time for time in found if time > 0]:
-        return min(found)
+        return {"duration": min(found), "after_story": "never"}
     duration = _USUAL_DURATION + latest
     if stop is not None:
         words = f"the run ends after {duration:g} s{' at the latest' if ends else ''}"
         report.mark(stop, "approximated", words)
-    return duration
+    return {"duration": duration}
 
 
 def _stop_condition(

@@ -15,6 +15,7 @@ from odscen.scenario.story.story_engine import StoryEngine
 from odscen.sumo.realize.rules.story_files import StoryPlan
 from odscen.sumo.worker.simulation.moved_actors import SavedWalk
 from odscen.sumo.worker.story.body_contacts import BodyContacts
+from odscen.sumo.worker.story.end_watch import EndWatch
 from odscen.sumo.worker.story.saved_walks import mend_walks
 from odscen.sumo.worker.story.story_hands import StoryHands
 from odscen.sumo.worker.story.story_view import StoryView
@@ -54,6 +55,7 @@ class StoryRun:
             rule_changes=self._engine.rule_changes,
         )
         self._read_wishes(story)
+        self._end = EndWatch(plan, self._view)
         self._hands = StoryHands(story, self._planned, net_offset=plan.net_offset)
         self._rules = story.rules
         self._contacts = BodyContacts(self._planned, plan.net_offset, story.by_story)
@@ -98,6 +100,10 @@ class StoryRun:
         """Look at all rules in each step: not SUMO alone drives."""
         self._engine.patient = False
 
+    def leave_end_open(self) -> None:
+        """Do not end the run with the story: a program drives, or has rules still to come."""
+        self._end.watches = False
+
     def _read_wishes(self, story: StoryPlan) -> None:
         """Let the view read what rules ask of actors."""
         self._view.whole |= _asked_by(story, _MORE)
@@ -119,8 +125,8 @@ class StoryRun:
 
     @property
     def over(self) -> bool:
-        """Whether a rule has ended the run."""
-        return self._hands.over
+        """Whether a rule has ended the run, or the story has ended and its time after that."""
+        return self._hands.over or self._end.over
 
     @property
     def moved(self) -> frozenset[str]:
@@ -144,6 +150,18 @@ class StoryRun:
         wanted, events = self._engine.step(self._view)
         if contacts or events:
             recorder.events.extend([*contacts, *map(self._rule_event, events)])
+        self._obey(road, wanted, moved, recorder, time)
+        recorder.events.extend(self._end.look(road, self._engine, time))
+
+    def _obey(
+        self,
+        road: MovedActors,
+        wanted: Mapping[str, WantedMove],
+        moved: Mapping[str, WantedMove],
+        recorder: Recorder,
+        time: float,
+    ) -> None:
+        """Do what rules want until the next look."""
         if not moved and not wanted and not self._engine.asked:
             return
         self._lost = self._hands.lost = []
@@ -188,6 +206,7 @@ class StoryRun:
             "fastest": self._fastest,
             "waits": {name: list(pose) for name, pose in self._waits.items()},
             "walks": {name: [list(one.edges), one.arrival] for name, one in self._walks.items()},
+            "end": self._end.state(),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -196,6 +215,8 @@ class StoryRun:
         self._view.restore(state["view"])
         self._contacts.restore(state["contacts"])
         self._hands.restore(state["hands"])
+        if "end" in state:
+            self._end.restore(state["end"])
         self._goal_edges = dict(state["goal_edges"])
         self._sent = dict(state["sent"])
         for name, kept in state["moves"].items():

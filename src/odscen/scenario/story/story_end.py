@@ -1,0 +1,124 @@
+"""When a story has ended: no rule is under way, and none can fire any more.
+
+A rule can fire no more when it has fired as often as it may; or when its condition is about an
+actor who has left the road; or about another rule that will neither begin nor end any more; or,
+once nobody has moved for :data:`STILL` seconds, when it is about motion alone.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from odscen.scenario.document.rules_document import Action, Condition, StoryRule
+    from odscen.scenario.story.story_engine import RuleState, Running
+
+STILL = 60.0
+"""Seconds for which nobody has moved: longer than most red lights."""
+_SAME = 0.01
+"""Metres within which a replay stays at one place."""
+_TIMED = frozenset({"time", "signal", "own", "not_"})
+"""Conditions that can come true although nobody moves, and whoever is there."""
+
+
+def story_has_ended(
+    rules: Mapping[str, StoryRule],
+    states: Mapping[str, RuleState],
+    *,
+    now: float,
+    gone: Callable[[str], bool],
+    still: bool,
+) -> bool:
+    """Whether no rule is under way and none can fire any more.
+
+    What goes on without an end of its own, such as a gap that is kept, counts as over.
+
+    Parameters
+    ----------
+    gone
+        Whether an actor has left the road for good.
+    still
+        Whether nobody has moved for :data:`STILL` seconds.
+    """
+    under_way = {name for name, state in states.items() if _is_under_way(rules[name], state, now)}
+    if under_way:
+        return False
+    open_rules = {name for name, rule in rules.items() if states[name].fired < rule.times}
+    # What can fire may let others fire: begin with all, and leave out those that cannot.
+    while open_rules:
+        dead = {
+            name
+            for name in open_rules
+            if not _can_hold(rules[name].when, rules[name].actor, states, open_rules, gone, still)
+        }
+        if not dead:
+            return False
+        open_rules -= dead
+    return True
+
+
+def longest_delay(rules: Mapping[str, StoryRule], states: Mapping[str, RuleState]) -> float:
+    """Seconds after which a condition that has held may still let one of the rules fire."""
+    waiting = (rule for name, rule in rules.items() if states[name].fired < rule.times)
+    return max((_delay_of(rule.when) for rule in waiting), default=0.0)
+
+
+def _delay_of(condition: Condition) -> float:
+    kind = condition.kind
+    parts: tuple[Condition, ...] = ()
+    if kind in ("all", "any"):
+        parts = getattr(condition, kind)
+    elif condition.not_ is not None:
+        parts = (condition.not_,)
+    return condition.delay + max(map(_delay_of, parts), default=0.0)
+
+
+def _can_hold(
+    condition: Condition,
+    actor: str,
+    states: Mapping[str, RuleState],
+    open_rules: set[str],
+    gone: Callable[[str], bool],
+    still: bool,
+) -> bool:
+    """Whether a condition of a rule of ``actor`` may come true."""
+    kind = condition.kind
+    part: Any = getattr(condition, kind)
+    if kind in ("all", "any"):
+        parts = (_can_hold(inner, actor, states, open_rules, gone, still) for inner in part)
+        return all(parts) if kind == "all" else any(parts)
+    if kind in _TIMED:
+        return True
+    if kind == "rule":
+        state = states.get(part.id)
+        return state is not None and (
+            bool(state.started if part.has == "started" else state.ended) or part.id in open_rules
+        )
+    names = {part.of or actor, *((part.to,) if getattr(part, "to", None) else ())}
+    if any(map(gone, names)):
+        return False
+    if kind == "stopped":
+        return not still or part.seconds > STILL
+    return kind == "appeared" or not still
+
+
+def _is_under_way(rule: StoryRule, state: RuleState, now: float) -> bool:
+    if state.item is None:
+        return False
+    parts = rule.then[state.item].parts
+    return not all(_goes_on_for_ever(parts[one.number], one, now) for one in state.running)
+
+
+def _goes_on_for_ever(action: Action, running: Running, now: float) -> bool:
+    """Whether an action has no end of its own, or none of which anything would be seen."""
+    if action.keep_gap is not None:
+        return running.end == math.inf and not action.keep_gap.once
+    if action.replay is not None and running.end < math.inf:
+        begin = running.end - action.replay.rows[-1][0]
+        left = [row for row in action.replay.rows if row[0] > now - begin]
+        x, y = left[-1][1:3] if left else (0.0, 0.0)
+        return all(math.dist(row[1:3], (x, y)) < _SAME for row in left)
+    return False
