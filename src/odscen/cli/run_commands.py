@@ -103,7 +103,7 @@ def run(
     after_story: Annotated[
         str | None,
         typer.Option(
-            help="How long a run goes on once its story has ended: seconds, never (to its "
+            help="How long a run continues once its story has ended: seconds, never (to its "
             "duration) or auto (10 s in a scene without traffic). (default: the scenario's own)",
             metavar="[SECONDS|auto|never]",
         ),

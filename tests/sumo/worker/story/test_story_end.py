@@ -110,7 +110,7 @@ def test_when_nobody_has_moved_for_a_minute_the_story_has_ended(tmp_path: Path) 
     [ended] = [one for one in found.events if one.kind == "story_ended"]
     standing = max(float(one.time[one.speed > 0.1][-1]) for one in found.tracks.values())
     assert ended.time == pytest.approx(standing + 60.0, abs=1.5)
-    assert ended.detail == "nobody moves any more"
+    assert ended.detail == "no road user moves any more"
     assert end_of(found) == pytest.approx(ended.time + 10.0, abs=0.2)
     whole, sliced = found.events, told(prepared(scene([*stop, never]), slice_length=20.0),
                                        tmp_path / "sliced")  # fmt: skip

@@ -65,7 +65,7 @@ class EndWatch:
         if time - self._ended < max(settle, engine.longest_delay()) - 1e-9:
             return []
         self.over = True
-        words = "nobody moves any more" if still else "all rules are over"
+        words = "no road user moves any more" if still else "all rules are over"
         return [Event(self._ended, EventKind.STORY_ENDED, "story", detail=words)]
 
     def state(self) -> dict[str, Any]:
