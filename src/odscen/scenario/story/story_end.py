@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from odscen.scenario.document.rules_document import Action, Condition, StoryRule
-    from odscen.scenario.story.story_engine import RuleState, Running
+    from odscen.scenario.story.rule_states import RuleState, Running
 
 STILL = 60.0
 """Seconds for which nobody has moved: longer than most red lights."""

@@ -15,7 +15,7 @@ before, as the instant at which it comes true follows from its last two readings
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,6 +23,7 @@ from odscen.scenario.document.rules_document import actors_of, rule_parts
 from odscen.scenario.story.channels import ActingActor, CannotAct, Channel, WantedMove
 from odscen.scenario.story.condition_tree import CLOSE, NEVER_IN_STEP, ConditionTree
 from odscen.scenario.story.own_kinds import action_kind
+from odscen.scenario.story.rule_states import RuleState, Running
 from odscen.scenario.story.story_end import longest_delay, story_has_ended
 
 if TYPE_CHECKING:
@@ -261,38 +262,6 @@ _TELL: dict[str, Callable[[Any, str, RoadView], float]] = {
 
 
 # ----------------------------------------------------------------------------- rules over a run
-@dataclass
-class Running:
-    """An action that runs: its place in the item of ``then``, and when it is over."""
-
-    number: int
-    end: float
-
-    def state(self) -> dict[str, Any]:
-        """Values that JSON can hold."""
-        return {"number": self.number, "end": None if self.end == math.inf else self.end}
-
-    @classmethod
-    def from_state(cls, state: Mapping[str, Any]) -> Running:
-        """Inverse of :meth:`state`."""
-        return cls(state["number"], math.inf if state["end"] is None else state["end"])
-
-
-@dataclass
-class RuleState:
-    """A rule: how often it has fired, what it does, and when it may fire again.
-
-    ``started`` and ``ended`` have the first instant of each, if there was one.
-    """
-
-    fired: int = 0
-    ready: float = 0.0
-    item: int | None = None
-    running: list[Running] = field(default_factory=list)
-    started: list[float] = field(default_factory=list)
-    ended: list[float] = field(default_factory=list)
-
-
 STARTED, ENDED, FAILED, OVERRIDDEN = "started", "ended", "failed", "overridden"
 ACTED = "acted"
 """What can be said of a rule."""
@@ -386,7 +355,10 @@ class StoryEngine:
         return bool(self._rules)
 
     def has_ended(self, now: float, *, gone: Callable[[str], bool], still: bool) -> bool:
-        """Whether no rule is under way and none can fire any more, see :mod:`.story_end`."""
+        """Whether no rule is under way and none can fire any more.
+
+        See :func:`~odscen.scenario.story.story_end.story_has_ended`.
+        """
         return story_has_ended(self._rules, self._states, now=now, gone=gone, still=still)
 
     def longest_delay(self) -> float:

@@ -11,8 +11,8 @@ from odscen.figures.judging.criteria import awaited_actors, criteria_of
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.rules_document import StoryRule
+from odscen.scenario.story.rule_states import RuleState, Running
 from odscen.scenario.story.story_end import story_has_ended
-from odscen.scenario.story.story_engine import RuleState, Running
 from tests.sumo.story_case import MIDDLE, RIGHT, document, prepared, run, told
 from tests.sumo.worker.story.test_story_run import MOTORWAY, STEPS, after, fast
 
