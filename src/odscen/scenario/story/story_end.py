@@ -43,21 +43,13 @@ def story_has_ended(
     still
         Whether nobody has moved for :data:`STILL` seconds.
     """
-    under_way = {name for name, state in states.items() if _is_under_way(rules[name], state, now)}
-    if under_way:
+    if any(_is_under_way(rules[name], state, now) for name, state in states.items()):
         return False
-    open_rules = {name for name, rule in rules.items() if states[name].fired < rule.times}
-    # What can fire may let others fire: begin with all, and leave out those that cannot.
-    while open_rules:
-        dead = {
-            name
-            for name in open_rules
-            if not _can_hold(rules[name].when, rules[name].actor, states, open_rules, gone, still)
-        }
-        if not dead:
-            return False
-        open_rules -= dead
-    return True
+    # A rule that waits for others fires after one that waits for none of those that are left.
+    return not any(
+        states[name].fired < rule.times and _can_hold(rule.when, rule.actor, states, gone, still)
+        for name, rule in rules.items()
+    )
 
 
 def longest_delay(rules: Mapping[str, StoryRule], states: Mapping[str, RuleState]) -> float:
@@ -80,23 +72,20 @@ def _can_hold(
     condition: Condition,
     actor: str,
     states: Mapping[str, RuleState],
-    open_rules: set[str],
     gone: Callable[[str], bool],
     still: bool,
 ) -> bool:
-    """Whether a condition of a rule of ``actor`` may come true."""
+    """Whether a condition of a rule of ``actor`` may come true if no other rule fires."""
     kind = condition.kind
     part: Any = getattr(condition, kind)
     if kind in ("all", "any"):
-        parts = (_can_hold(inner, actor, states, open_rules, gone, still) for inner in part)
+        parts = (_can_hold(inner, actor, states, gone, still) for inner in part)
         return all(parts) if kind == "all" else any(parts)
     if kind in _TIMED:
         return True
     if kind == "rule":
         state = states.get(part.id)
-        return state is not None and (
-            bool(state.started if part.has == "started" else state.ended) or part.id in open_rules
-        )
+        return state is not None and bool(state.started if part.has == "started" else state.ended)
     names = {part.of or actor, *((part.to,) if getattr(part, "to", None) else ())}
     if any(map(gone, names)):
         return False

@@ -13,7 +13,7 @@ from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.rules_document import StoryRule
 from odscen.scenario.story.rule_states import RuleState, Running
 from odscen.scenario.story.story_end import story_has_ended
-from tests.sumo.story_case import MIDDLE, RIGHT, document, prepared, run, told
+from tests.sumo.story_case import MIDDLE, RIGHT, document, node_at, prepared, run, told
 from tests.sumo.worker.story.test_story_run import MOTORWAY, STEPS, after, fast
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def test_how_long_a_run_goes_on_is_said(
 
 def test_a_run_with_traffic_is_one_of_traffic() -> None:
     """Its plan has none of the fields, and it goes on."""
-    flow = {"id": "f", "spawn": scene([]).actors[0].spawn, "per_hour": 60.0, "end": 1.0}
+    flow = {"id": "f", "spawn": node_at(MOTORWAY, 700.0, MIDDLE), "per_hour": 60.0, "end": 60.0}
     made = scene([SLOWER], flows=[flow])
     assert not made.is_scene
     plan = prepared(made).plan
