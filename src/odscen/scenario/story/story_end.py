@@ -107,7 +107,8 @@ def _goes_on_for_ever(action: Action, running: Running, now: float) -> bool:
         return running.end == math.inf and not action.keep_gap.once
     if action.replay is not None and running.end < math.inf:
         begin = running.end - action.replay.rows[-1][0]
-        left = [row for row in action.replay.rows if row[0] > now - begin]
-        x, y = left[-1][1:3] if left else (0.0, 0.0)
-        return all(math.dist(row[1:3], (x, y)) < _SAME for row in left)
+        rows = action.replay.rows
+        passed = sum(row[0] <= now - begin for row in rows)
+        left = rows[max(0, passed - 1) :]
+        return all(math.dist(row[1:3], left[0][1:3]) < _SAME for row in left)
     return False
