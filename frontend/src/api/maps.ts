@@ -1,6 +1,6 @@
 import { t } from "@lingui/core/macro";
 
-import { address, api, ApiError, call } from "./client";
+import { address, api, ApiError, call, form } from "./client";
 import type { components } from "./schema";
 import type { ConversionReport, Job } from "./types";
 
@@ -25,6 +25,23 @@ export const mendMap = (name: string, edits: MapEdit[], out: string) =>
 /** What is at a place of a map, metres. */
 export const placeAt = (name: string, x: number, y: number): Promise<PlaceInfo> =>
   call("get", "/api/maps/{name}/place", { params: { path: { name }, query: { x, y } } });
+
+type Background = components["schemas"]["BackgroundInfo"];
+
+/** The picture under a map, if it has one. */
+export const background = (name: string): Promise<Background | null> =>
+  call("get", "/api/maps/{name}/background", { params: { path: { name } } });
+export const backgroundPicture = (name: string): string =>
+  address("/api/maps/{name}/background/picture", { params: { path: { name } } });
+
+/** Lays a picture under a map: by a world file, the tags of a GeoTIFF, or points. */
+export const setBackground = (
+  name: string,
+  given: { file: File; world: File | null; crs: string | null; points: string | null },
+): Promise<Background> =>
+  call("post", "/api/maps/{name}/background", { params: { path: { name } }, body: form(given) });
+export const removeBackground = (name: string) =>
+  call("delete", "/api/maps/{name}/background", { params: { path: { name } } });
 
 /** Formats that maps can have. */
 export const mapImporters = () => call("get", "/api/map-importers");

@@ -122,6 +122,30 @@ export interface paths {
          */
         get: operations["assets_api_assets_get"];
     };
+    "/api/maps/{name}/background": {
+        /**
+         * Show Background
+         * @description The picture under a map, if it has one.
+         */
+        get: operations["show_background_api_maps__name__background_get"];
+        /**
+         * Set Background
+         * @description Lay a picture under a map, in place of the one that it has.
+         */
+        post: operations["set_background_api_maps__name__background_post"];
+        /**
+         * Remove Background
+         * @description Take the picture under a map away.
+         */
+        delete: operations["remove_background_api_maps__name__background_delete"];
+    };
+    "/api/maps/{name}/background/picture": {
+        /**
+         * Show Picture
+         * @description The picture itself, PNG or JPEG.
+         */
+        get: operations["show_picture_api_maps__name__background_picture_get"];
+    };
     "/api/generators": {
         /**
          * List Generators
@@ -1088,6 +1112,18 @@ export interface components {
             trips: number | null;
         };
         /**
+         * @description The picture under a map: pixels, and where it lies.
+         *
+         *     ``affine`` are the numbers a to f of x = a column + b row + c, y = d column + e row + f, metres.
+         */
+        BackgroundInfo: {
+            source: string;
+            width: number;
+            height: number;
+            affine: number[];
+            version: string;
+        };
+        /**
          * @description In which direction a figure is better.
          * @enum {string}
          */
@@ -1140,6 +1176,16 @@ export interface components {
             version: number;
             /** @description Only this light. */
             junction?: string | null;
+        };
+        Body_set_background_api_maps__name__background_post: {
+            /** @description PNG, JPEG or TIFF. */
+            file: string;
+            /** @description World file. */
+            world?: string | null;
+            /** @description Of the world file; else metres. */
+            crs?: string | null;
+            /** @description JSON: rows of column, row, x and y, two or more. */
+            points?: string | null;
         };
         Body_table_api_scenarios__name__demand_table_post: {
             /** @description Comma, semicolon or tab separated. */
@@ -5951,6 +5997,75 @@ export interface operations {
             200: {
                 content: {
                     "application/json": components["schemas"]["AssetsInfo"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    show_background_api_maps__name__background_get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["BackgroundInfo"] | null;
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    set_background_api_maps__name__background_post: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": FormData;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["BackgroundInfo"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    remove_background_api_maps__name__background_delete: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": unknown;
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    show_picture_api_maps__name__background_picture_get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "*/*": string;
                 };
             };
             default: components["responses"]["Error"];

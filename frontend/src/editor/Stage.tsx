@@ -86,6 +86,7 @@ export function Stage({
       <div className="stage-map">
         <MapCanvas
           drawing={drawing}
+          map={document.map.name}
           graph={graph}
           picker={picker}
           scene={scene}

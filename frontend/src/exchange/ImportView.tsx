@@ -143,6 +143,7 @@ function Shown({ name, whole }: { name: string; whole: Whole }) {
       <div className="import-map">
         <MapCanvas
           drawing={drawing}
+          map={report.map}
           graph={loaded.graph}
           picker={loaded.picker}
           scene={scene}

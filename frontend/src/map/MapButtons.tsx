@@ -1,4 +1,4 @@
-import { ActionIcon, Checkbox, Popover, Stack, Tooltip } from "@mantine/core";
+import { ActionIcon, Checkbox, Popover, Slider, Stack, Text, Tooltip } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { memo, type ReactNode } from "react";
@@ -6,6 +6,7 @@ import { memo, type ReactNode } from "react";
 import { localized } from "../language/localized";
 import { IconFit, IconLayers, IconMinus, IconPlus, IconRuler } from "../ui/icons";
 import { type MapLayers, showLayer, useMapLayers } from "./mapLayers";
+import { showRoads, useUnderlays } from "./underlay";
 
 const NAMES = localized((): Record<keyof MapLayers, string> => ({
   grid: t`Grid with coordinates`,
@@ -13,6 +14,7 @@ const NAMES = localized((): Record<keyof MapLayers, string> => ({
   nodes: t`Start points and lane graph, when near`,
   signs: t`Signs and traffic lights`,
   buildings: t`Buildings`,
+  picture: t`Picture under the map`,
   overview: t`Overview map`,
 }));
 
@@ -22,15 +24,18 @@ export const MapButtons = memo(function MapButtons({
   onAll,
   measuring,
   onMeasure,
+  pictured,
 }: {
   onZoom: (factor: number) => void;
   onAll: () => void;
   measuring: boolean;
   onMeasure: () => void;
+  /** Whether a picture lies under the map. */
+  pictured: boolean;
 }) {
   return (
     <div className="map-buttons">
-      <LayersButton />
+      <LayersButton pictured={pictured} />
       <MapButton label={t`Measure lengths and areas (R)`} pressed={measuring} onClick={onMeasure}>
         <IconRuler />
       </MapButton>
@@ -47,8 +52,12 @@ export const MapButtons = memo(function MapButtons({
   );
 });
 
-function LayersButton() {
+function LayersButton({ pictured }: { pictured: boolean }) {
   const layers = useMapLayers();
+  const roads = useUnderlays((all) => all.roads);
+  const names = (Object.keys(NAMES()) as (keyof MapLayers)[]).filter(
+    (name) => pictured || name !== "picture",
+  );
   return (
     <Popover position="left-end" shadow="md" trapFocus returnFocus>
       <Popover.Target>
@@ -63,7 +72,7 @@ function LayersButton() {
           <strong>
             <Trans>On the map</Trans>
           </strong>
-          {(Object.keys(NAMES()) as (keyof MapLayers)[]).map((name) => (
+          {names.map((name) => (
             <Checkbox
               key={name}
               size="sm"
@@ -72,6 +81,22 @@ function LayersButton() {
               onChange={({ currentTarget: { checked } }) => showLayer(name, checked)}
             />
           ))}
+          {pictured && layers.picture && (
+            <div>
+              <Text size="sm" id="roads-over-picture">
+                <Trans>Roads over the picture</Trans>
+              </Text>
+              <Slider
+                min={0}
+                max={1}
+                step={0.05}
+                value={roads}
+                onChange={showRoads}
+                label={(share) => `${Math.round(share * 100)} %`}
+                thumbProps={{ "aria-labelledby": "roads-over-picture" }}
+              />
+            </div>
+          )}
         </Stack>
       </Popover.Dropdown>
     </Popover>

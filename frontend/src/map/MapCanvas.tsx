@@ -27,6 +27,7 @@ import type { Picker } from "./picking";
 import { CanvasRenderer, type MapRenderer } from "./renderer";
 import { ScaleBar } from "./ScaleBar";
 import type { Mark, Moving, Scene } from "./scene";
+import { useUnderlay, useUnderlays } from "./underlay";
 import { useMeasure } from "./useMeasure";
 import { clampTo, fit, panBy, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { legendRows } from "./writtenLegend";
@@ -62,6 +63,8 @@ export interface MapHandle {
 
 interface Props {
   drawing: PackedDrawing;
+  /** Name of the map in the catalogue, whose picture lies under it. */
+  map?: string;
   graph: Graph | null;
   picker: Picker | null;
   scene: Scene;
@@ -94,6 +97,7 @@ const EDGE = 0.06;
 /** The map: drag or arrow keys move it, wheel or + and - zoom, Enter acts on the middle. */
 export function MapCanvas({
   drawing,
+  map,
   graph,
   picker,
   scene,
@@ -125,6 +129,8 @@ export function MapCanvas({
   const dark = useComputedColorScheme("light") === "dark";
   const queued = useRef(0);
   const shownLayers = useMapLayers();
+  const underlay = useUnderlay(map);
+  const roads = useUnderlays((all) => all.roads);
   const measure = useMeasure(host);
   const measuring = measure.measured !== null;
 
@@ -178,6 +184,10 @@ export function MapCanvas({
   useEffect(() => ready?.setTheme(dark), [ready, dark]);
   useEffect(() => ready?.setScene(scene), [ready, scene]);
   useEffect(() => ready?.setLayers(shownLayers), [ready, shownLayers]);
+  useEffect(
+    () => ready?.setUnderlay(shownLayers.picture ? underlay : null, roads),
+    [ready, underlay, roads, shownLayers.picture],
+  );
   useEffect(() => ready?.setMeasured(measure.marks), [ready, measure.marks]);
 
   const { add, point, toggle } = measure;
@@ -378,7 +388,13 @@ export function MapCanvas({
             onMove={goTo}
           />
         )}
-        <MapButtons onZoom={zoom} onAll={showAll} measuring={measuring} onMeasure={onMeasure} />
+        <MapButtons
+          onZoom={zoom}
+          onAll={showAll}
+          measuring={measuring}
+          onMeasure={onMeasure}
+          pictured={underlay !== null}
+        />
       </div>
       {measure.measured && <MeasureBar measured={measure.measured} onEnd={measure.end} />}
       <ScaleBar scale={shown.scale} />

@@ -4,6 +4,7 @@ import type { Palette } from "./colors";
 import { type Lines, type PackedDrawing, type PackedLines, tiles, unpack } from "./drawing";
 import type { MapLayers } from "./mapLayers";
 import { type PathMaker, screenPath } from "./svg";
+import type { Underlay } from "./underlay";
 import { overlaps, type Size, type View, visible, worldTransform } from "./view";
 
 interface TilePath {
@@ -26,6 +27,9 @@ const CELL = 120;
 /** The map itself: what does not change while it is looked at. */
 export class BaseLayer {
   private readonly items: Item[];
+  underlay: Underlay | null = null;
+  /** How much the roads hide of the picture under them, 0 to 1. */
+  roads = 1;
 
   constructor(
     private readonly drawing: PackedDrawing,
@@ -60,13 +64,16 @@ export class BaseLayer {
     worldTransform(context, view, size, ratio);
     context.lineJoin = "round";
     const seen = visible(view, size);
+    if (this.underlay) drawUnderlay(context, this.underlay);
     for (const one of this.items) {
       if (one.look.what === "building" && !shown.buildings) continue;
       if (!style(context, one.look, view.scale, palette)) continue;
+      context.globalAlpha = this.underlay && one.look.what !== "mark" ? this.roads : 1;
       for (const tile of one.tiles) {
         if (overlaps(tile.bounds, seen)) paint(context, one.look, tile.path);
       }
     }
+    context.globalAlpha = 1;
     context.setLineDash([]);
     if (shown.signs) this.drawSymbols(context, view, size, ratio);
   }
@@ -84,6 +91,15 @@ export class BaseLayer {
       symbol(context, kind, text);
     }
   }
+}
+
+/** The context is in metres; a picture has its rows downwards. */
+function drawUnderlay(context: CanvasRenderingContext2D, { image, width, height, affine }: Underlay): void {
+  const [a = 1, b = 0, c = 0, d = 0, e = -1, f = 0] = affine;
+  context.save();
+  context.transform(a, d, b, e, c, f);
+  context.drawImage(image, 0, 0, width, height);
+  context.restore();
 }
 
 function furniture(

@@ -10,6 +10,8 @@ export interface MapLayers {
   /** Signs and traffic lights of the map. */
   signs: boolean;
   buildings: boolean;
+  /** The picture that lies under the map, if it has one. */
+  picture: boolean;
   overview: boolean;
 }
 
@@ -19,6 +21,7 @@ export const FIRST_LAYERS: MapLayers = {
   nodes: true,
   signs: true,
   buildings: true,
+  picture: true,
   overview: true,
 };
 const KEY = "odscen.layers";

@@ -10,6 +10,7 @@ import type { Picker } from "./picking";
 import { SceneLayer } from "./sceneLayer";
 import { EMPTY_SCENE, type Mark, type Moving, type Scene } from "./scene";
 import { writtenPath, writtenPicture } from "./svg";
+import type { Underlay } from "./underlay";
 import type { Size, View } from "./view";
 import { drawLegend, type LegendRow } from "./writtenLegend";
 
@@ -20,6 +21,8 @@ export interface MapRenderer {
   setView(view: View): void;
   setScene(scene: Scene): void;
   setLayers(layers: MapLayers): void;
+  /** A picture under the map, and how much the roads hide of it, 0 to 1. */
+  setUnderlay(underlay: Underlay | null, roads: number): void;
   setMoving(moving: Moving | null): void;
   setHeads(heads: readonly Head[]): void;
   setMarks(marks: readonly Mark[]): void;
@@ -118,6 +121,14 @@ export class CanvasRenderer implements MapRenderer {
     this.mark("scene");
   }
 
+  setUnderlay(underlay: Underlay | null, roads: number): void {
+    if (this.base.underlay === underlay && this.base.roads === roads) return;
+    this.base.underlay = underlay;
+    this.base.roads = roads;
+    this.cacheView = null;
+    this.mark("base");
+  }
+
   setMoving(moving: Moving | null): void {
     this.currentMoving = moving;
     this.mark("moving");
@@ -164,6 +175,8 @@ export class CanvasRenderer implements MapRenderer {
     const { view, size, palette } = this;
     // Paths for a screen cannot be read: they are made anew, as words.
     const base = new BaseLayer(this.drawing, writtenPath);
+    base.underlay = this.base.underlay;
+    base.roads = this.base.roads;
     const scene = new SceneLayer(this.graph, this.picker, writtenPath);
     return writtenPicture(size, (context) => {
       base.draw(context, view, size, 1, palette, this.layers);

@@ -19,6 +19,7 @@ import { go, hashOf } from "../ui/address";
 import { IconRedo, IconUndo } from "../ui/icons";
 import { tellError } from "../ui/notices";
 import { useLoaded } from "../ui/useLoaded";
+import { type Placing, PictureForm } from "./PictureForm";
 import { editWords, partWords } from "./words";
 
 type Row = ConversionReport["entries"][number];
@@ -84,6 +85,7 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
   const [turning, setTurning] = useState<"add_turn" | "remove_turn" | null>(null);
   const [undone, setUndone] = useState<MapEdit[]>([]);
   const [working, setWorking] = useState(false);
+  const [placing, setPlacing] = useState<Placing | null>(null);
 
   const send = async (next: MapEdit[], left: MapEdit[]): Promise<void> => {
     setWorking(true);
@@ -124,7 +126,9 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
   const undo = (): void => void send(edits.slice(0, -1), [...edits.slice(-1), ...undone]);
   const redo = (): void => void send([...edits, ...undone.slice(0, 1)], undone.slice(1));
   const pick = (at: Pointed): void => {
-    if (turning && chosen) {
+    if (placing) {
+      placing.onMap(at.x, at.y);
+    } else if (turning && chosen) {
       if (working) return;
       const { x, y, info } = chosen;
       add({ kind: turning, at: { x, y, hdg: info.hdg }, to: { x: at.x, y: at.y } });
@@ -139,9 +143,12 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
       ...EMPTY_SCENE,
       nodes: { vehicles: false, walks: false, inside: null },
       lanes: chosen ? [new Float64Array(chosen.info.ring)] : [],
-      pins: chosen ? [{ x: chosen.x, y: chosen.y, sign: "+", text: lengthText(chosen.info.width, 2) }] : [],
+      pins: [
+        ...(chosen ? [{ x: chosen.x, y: chosen.y, sign: "+", text: lengthText(chosen.info.width, 2) }] : []),
+        ...(placing?.pins ?? []),
+      ],
     }),
-    [chosen],
+    [chosen, placing],
   );
   return (
     <div
@@ -236,10 +243,12 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
             ))}
           </ol>
         )}
+        <PictureForm map={map} onPlacing={setPlacing} />
       </section>
       <div className="import-map">
         <MapCanvas
           drawing={drawing}
+          map={map}
           graph={loaded.graph}
           picker={loaded.picker}
           scene={scene}

@@ -32,6 +32,8 @@ interface Props {
   /** Whether the server does not answer at the moment. */
   lost: boolean;
   live: boolean;
+  /** Name of the map in the catalogue. */
+  map: string | undefined;
   drawing: PackedDrawing;
   loaded: LoadedGraph | null;
   scene: Scene;
@@ -67,6 +69,7 @@ export function RunMap({
   lost,
   live,
   drawing,
+  map,
   loaded,
   scene,
   heads,
@@ -135,6 +138,7 @@ export function RunMap({
     >
       <MapCanvas
         drawing={drawing}
+        map={map}
         graph={loaded?.graph ?? null}
         picker={loaded?.picker ?? null}
         scene={coloured}

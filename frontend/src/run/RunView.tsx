@@ -209,6 +209,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
                   lost={lost && n === 0}
                   live={live}
                   drawing={drawing}
+                  map={info.map ?? undefined}
                   loaded={loaded}
                   scene={scene}
                   heads={heads}

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from odscen.convert.verify.fidelity_result import Fidelity
+    from odscen.maps.background import PicturePoint
     from odscen.maps.map_entry import MapEntry
 
 UNITS = dict.fromkeys(
@@ -260,6 +261,9 @@ def render(
         int, typer.Option(help="Width of a PNG in pixels.", min=100, max=16000)
     ] = 2400,
     graph: Annotated[bool, typer.Option("--graph", help="Draw the lane graph on top.")] = False,
+    picture: Annotated[
+        bool, typer.Option("--picture", help="Draw the picture that lies under the map.")
+    ] = False,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -267,10 +271,91 @@ def render(
     from odscen.maps.map_pictures import draw_map
     from odscen.maps.store import Workspace
 
-    draw_map(Workspace.open(workspace).map(name), out, width=width, with_graph=graph)
+    store = Workspace.open(workspace)
+    under = store.background(name) if picture else None
+    if picture and under is None:
+        raise InputError(f"map {name!r} has no picture under it: odscen maps background")
+    draw_map(store.map(name), out, width=width, with_graph=graph, background=under)
     log(f"Wrote {out}")
     if as_json:
         print_json({"name": name, "file": str(out)})
+
+
+@app.command()
+def background(
+    name: Annotated[str, typer.Argument(metavar="MAP")],
+    picture: Annotated[
+        Path | None,
+        typer.Argument(help="PNG, JPEG or TIFF. (default: show what MAP has)", metavar="PICTURE"),
+    ] = None,
+    world: Annotated[
+        Path | None,
+        typer.Option(
+            help="World file. (default: the one beside PICTURE, or the tags of a GeoTIFF)",
+            metavar="FILE",
+        ),
+    ] = None,
+    crs: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the world file, for example EPSG:25832. (default: metres of the map)",
+            metavar="CRS",
+        ),
+    ] = None,
+    point: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A place in the picture, pixels, and on the map, metres; at least twice.",
+            metavar="COLUMN,ROW=X,Y",
+        ),
+    ] = None,
+    remove: Annotated[bool, typer.Option("--remove", help="Take the picture away.")] = False,
+    workspace: WorkspaceOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Lay a picture under a map: an aerial photograph, or a plan."""
+    from odscen.base.given_files import read_given_text
+    from odscen.maps.store import Workspace
+
+    store = Workspace.open(workspace)
+    if remove:
+        if picture is not None:
+            raise InputError("--remove takes no picture")
+        store.remove_background(name)
+        found = None
+    elif picture is not None:
+        found = store.set_background(
+            name,
+            picture,
+            world=None if world is None else read_given_text(world),
+            crs=crs,
+            points=[_parse_point(text) for text in point or ()],
+        )
+    else:
+        found = store.background(name)
+    if as_json:
+        print_json({"map": name, "background": None if found is None else found.to_dict()})
+    elif found is None:
+        log(f"{name} has no picture under it")
+    else:
+        x0, y0, x1, y1 = found.bounds()
+        log(
+            f"{found.source}: {found.width} x {found.height} pixels under {name}, "
+            f"x {x0:.1f} to {x1:.1f} m, y {y0:.1f} to {y1:.1f} m"
+        )
+
+
+def _parse_point(text: str) -> PicturePoint:
+    """Read ``column,row=x,y``."""
+    from odscen.maps.background import PicturePoint
+
+    try:
+        column, row, x, y = (
+            float(word) for half in text.split("=", 1) for word in half.split(",", 1)
+        )
+    except ValueError:
+        raise InputError(f"--point is COLUMN,ROW=X,Y, not {text!r}") from None
+    return PicturePoint(column, row, x, y)
 
 
 @app.command()

@@ -5,8 +5,9 @@ SVG without scripts and without anything from outside. The same map gives the sa
 
 from __future__ import annotations
 
+import base64
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import InputError, MissingDependencyError
 from odscen.base.given_files import as_path
@@ -41,6 +42,23 @@ _SHEET = 1200.0
 _MARGIN, _HEAD = 36.0, 74.0
 _SYMBOL = 18.0
 _RING = 8.0
+
+
+_OVER_PICTURE = 0.6
+"""Opacity of roads that lie over a picture."""
+
+
+class Underlay(NamedTuple):
+    """A PNG or JPEG under a map, and its pixels.
+
+    ``affine`` are a to f of ``x = a column + b row + c``, ``y = d column + e row + f``, metres.
+    """
+
+    content: bytes
+    media_type: str
+    width: int
+    height: int
+    affine: tuple[float, float, float, float, float, float]
 
 
 def render_svg(
@@ -78,6 +96,7 @@ def render_drawing(
     options: RenderOptions | None = None,
     view: Bounds | None = None,
     marks: Sequence[PlaceMarks] = (),
+    underlay: Underlay | None = None,
 ) -> str:
     """Draw a map from its shapes.
 
@@ -91,6 +110,8 @@ def render_drawing(
         Part of the map to show, metres; all of it by default.
     marks
         Places to be circled on top of everything, with an entry of the legend per kind.
+    underlay
+        Picture that lies under the roads, which are drawn lighter then.
 
     Returns
     -------
@@ -103,6 +124,8 @@ def render_drawing(
         drawing = drawing.clipped(frame.bounds)
     marks = [kind for kind in marks if kind.total]
     inside = _draw_inside(drawing, graph, options, frame)
+    if underlay is not None:
+        inside = _draw_underlay(underlay) + element("g", inside, opacity=_OVER_PICTURE)
     if marks:
         inside += place_layer(marks, radius=_RING / frame.scale)
     parts = [element("rect", width=frame.width, height="100%", fill=_PAPER)]
@@ -177,6 +200,21 @@ def _draw_inside(
         only = replace(drawing, areas=(), marks=())
         parts.append(map_layers(only, replace(layer_options, symbols=True, ground=False)))
     return join(parts)
+
+
+def _draw_underlay(picture: Underlay) -> Markup:
+    """The picture, in the map's centimetres; nothing of it is outside the document."""
+    a, b, c, d, e, f = picture.affine
+    matrix = (100 * a, -100 * d, 100 * b, -100 * e, 100 * c, -100 * f)
+    data = base64.b64encode(picture.content).decode("ascii")
+    return element(
+        "image",
+        width=float(picture.width),
+        height=float(picture.height),
+        transform=f"matrix({' '.join(f'{value:.9g}' for value in matrix)})",
+        preserveAspectRatio="none",
+        href=f"data:{picture.media_type};base64,{data}",
+    )
 
 
 def _draw_map(frame: _SheetFrame, inside: Markup) -> Markup:

@@ -9,11 +9,13 @@ import numpy as np
 
 from odscen.base.arrays import offsets
 from odscen.base.errors import InputError
+from odscen.base.given_files import read_given
 from odscen.convert.verify.fidelity_result import NEAR
 from odscen.drawing.legend import RenderOptions
 from odscen.drawing.map_drawing import Lines
-from odscen.drawing.map_sheet import render_drawing, svg_to_png
+from odscen.drawing.map_sheet import Underlay, render_drawing, svg_to_png
 from odscen.drawing.svg_layers import PlaceMarks
+from odscen.maps.background import MOST_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import FloatArray
     from odscen.convert.verify.fidelity_result import Fidelity
+    from odscen.maps.background import Background
     from odscen.maps.map_entry import MapEntry
 
 
@@ -38,9 +41,17 @@ class _Placed(Protocol):
 
 
 def draw_map(
-    entry: MapEntry, out: Path, *, width: int, with_graph: bool, with_segments: bool = False
+    entry: MapEntry,
+    out: Path,
+    *,
+    width: int,
+    with_graph: bool,
+    with_segments: bool = False,
+    background: Background | None = None,
 ) -> None:
     """Write a drawing of a map as SVG or PNG, by the ending of ``out``.
+
+    A ``background`` lies under the roads, and is in the file.
 
     Raises
     ------
@@ -53,8 +64,24 @@ def draw_map(
     options = RenderOptions(graph=with_graph, segments=with_segments)
     graph = entry.graph() if with_graph or with_segments else None
     statistics = entry.statistics()
-    svg = render_drawing(entry.drawing(), statistics=statistics, graph=graph, options=options)
+    svg = render_drawing(
+        entry.drawing(),
+        statistics=statistics,
+        graph=graph,
+        options=options,
+        underlay=None if background is None else _read_underlay(background),
+    )
     _write_picture(svg, out, width=width)
+
+
+def _read_underlay(background: Background) -> Underlay:
+    return Underlay(
+        read_given(background.path, most=MOST_BYTES),
+        background.media_type,
+        background.width,
+        background.height,
+        background.affine,
+    )
 
 
 def draw_fidelity(entry: MapEntry, fidelity: Fidelity, out: Path, *, width: int = 2400) -> None:

@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from odscen.base.atomic_folders import clear_leftovers, new_folder
+from odscen.base.atomic_folders import clear_leftovers, discard, new_folder
 from odscen.base.checksums import digest, sums_of, write_sums
 from odscen.base.errors import DamagedError, InputError, NotFoundError, OdscenError, in_file
 from odscen.base.folder_locks import locked
@@ -23,10 +23,18 @@ from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.maps.allowances import BY_SIZE
+from odscen.maps.background import (
+    MOST_BYTES,
+    find_world_file,
+    place_picture,
+    read_background,
+    write_background,
+)
 from odscen.maps.folder_names import check_name, is_name, name_from_file
 from odscen.maps.importers.base import DETECTED
 from odscen.maps.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.maps.map_files import read_map_file
+from odscen.maps.wastebasket import BACKGROUNDS
 from odscen.simulators.assets import assets_in
 
 if TYPE_CHECKING:
@@ -35,6 +43,7 @@ if TYPE_CHECKING:
 
     from odscen.base.given_files import GivenPath
     from odscen.maps.allowances import BuildLimits
+    from odscen.maps.background import Background, PicturePoint
     from odscen.maps.converters import GivenNetwork
     from odscen.maps.importers.base import ImportSettings
     from odscen.simulators.assets import Assets
@@ -417,10 +426,11 @@ class Workspace:
         else:
             added = check_edits(list(edits))
         before = read_edits(entry.importing.edits or "[]") if not anew else []
-        return self.add_map_content(
+        out = name if out is None else out
+        mended = self.add_map_content(
             entry.read(entry.source_key),
             file=str(entry.info["source"]),
-            name=name if out is None else out,
+            name=out,
             settings=entry.conversion,
             importing=replace(
                 entry.importing,
@@ -429,6 +439,102 @@ class Workspace:
             limits=limits,
             progress=progress,
         )
+        under = self.background(name)
+        if under is not None and self.background(out) is None:
+            content = read_given(under.path, most=MOST_BYTES)
+            write_background(self._background_folder(out), content, under)
+        return mended
+
+    def background(self, name: str) -> Background | None:
+        """Picture under a map; ``None`` if it has none.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        InputError
+            If what is said of its place is damaged.
+        """
+        return read_background(self._background_folder(name))
+
+    def set_background(
+        self,
+        name: str,
+        picture: GivenPath | bytes,
+        *,
+        source: str | None = None,
+        world: str | None = None,
+        crs: str | None = None,
+        points: Sequence[PicturePoint] = (),
+    ) -> Background:
+        """Lay a picture under a map, in place of the one that it has.
+
+        Parameters
+        ----------
+        picture
+            PNG, JPEG or TIFF: a file, whose world file is looked for beside it, or its content.
+        source
+            Name that is shown; of the file if not given.
+        world
+            Text of a world file; its numbers are in ``crs``, or in metres of the map.
+        crs
+            Coordinate reference system, for example ``EPSG:25832``.
+        points
+            Two or more places that are known in the picture and on the map; they go before the
+            world file and the tags of a GeoTIFF.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        InputError
+            If the picture cannot be read or is too large, or its place is not known.
+        MissingDependencyError
+            Of a TIFF, if Pillow is not installed.
+        WorkspaceError
+            If it cannot be written.
+        """
+        from odscen.opendrive.parse import parse
+
+        entry = self.stored(name)
+        if isinstance(picture, bytes):
+            content, file = picture, None
+        else:
+            file = as_path(picture)
+            content = read_given(file, most=MOST_BYTES)
+        if file is not None and world is None and (beside := find_world_file(file)) is not None:
+            world = read_given_text(beside)
+        with in_file(source or (file.name if file else "picture")):
+            content, placed = place_picture(
+                content,
+                source=source or (file.name if file else "picture"),
+                header=parse(entry.read("xodr"), file=entry.name).header,
+                bounds=entry.statistics().bounds,
+                world=world,
+                crs=crs,
+                points=points,
+            )
+        return write_background(self._background_folder(name), content, placed)
+
+    def remove_background(self, name: str) -> None:
+        """Take the picture under a map away, if it has one.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        WorkspaceError
+            If it cannot be removed.
+        """
+        folder = self._background_folder(name)
+        if folder.is_dir():
+            with disk_errors(f"the picture under map {name!r}"):
+                discard(folder)
+
+    def _background_folder(self, name: str) -> Path:
+        if not self._has_map(name):
+            raise NotFoundError("map", name, self.map_names())
+        return self.root / "maps" / BACKGROUNDS / name
 
     def set_network(
         self,

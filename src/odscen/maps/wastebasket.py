@@ -36,6 +36,10 @@ SCENARIO_SUFFIX = ".scenario.json"
 """Ending of scenario files."""
 HISTORY = ".history"
 """Folder beside scenarios with what undo goes back to, and inside a removed scenario."""
+BACKGROUNDS = ".backgrounds"
+"""Folder beside maps with the pictures that lie under them, and inside a removed map."""
+_COMPANIONS: dict[str, str] = {"scenario": HISTORY, "map": BACKGROUNDS}
+"""What goes along with what is removed."""
 
 _ID = re.compile(r"(map|scenario|run)-(\d{8}-\d{6})-[0-9a-f]{8}")
 _STAMP = "%Y%m%d-%H%M%S"
@@ -118,8 +122,8 @@ class Wastebasket:
         with held, disk_errors(f"{kind} {name!r}"):
             item.folder.mkdir(parents=True)
             place.rename(item.content)
-            if kind == "scenario":
-                _move_folder(self._history_folder(name), item.folder / HISTORY)
+            if kind in _COMPANIONS:
+                _move_folder(self._companion(kind, name), item.folder / _COMPANIONS[kind])
         self.sweep()
         return item
 
@@ -175,11 +179,11 @@ class Wastebasket:
                 "rename or remove that one, then restore this one"
             )
         with disk_errors(f"{item.kind} {item.name!r}"):
-            if item.kind == "scenario":
-                history = self._history_folder(item.name)
+            if item.kind in _COMPANIONS:
+                companion = self._companion(item.kind, item.name)
                 with suppress(FileNotFoundError):  # of a namesake that is gone
-                    discard(history)
-                _move_folder(item.folder / HISTORY, history)
+                    discard(companion)
+                _move_folder(item.folder / _COMPANIONS[item.kind], companion)
             item.content.rename(place)
             shutil.rmtree(item.folder)
         return item
@@ -212,8 +216,8 @@ class Wastebasket:
         ending = SCENARIO_SUFFIX if kind == "scenario" else ""
         return self._folders[kind] / (check_name(name, what=kind) + ending)
 
-    def _history_folder(self, name: str) -> Path:
-        return self._folders["scenario"] / HISTORY / name
+    def _companion(self, kind: RemovedKind, name: str) -> Path:
+        return self._folders[kind] / _COMPANIONS[kind] / name
 
 
 def _read_item(folder: Path) -> RemovedItem | None:
@@ -225,7 +229,7 @@ def _read_item(folder: Path) -> RemovedItem | None:
     ending = SCENARIO_SUFFIX if kind == "scenario" else ""
     with suppress(OSError):
         for path in folder.iterdir():
-            if path.name != HISTORY and path.name.endswith(ending):
+            if path.name not in _COMPANIONS.values() and path.name.endswith(ending):
                 name = path.name.removesuffix(ending)
                 return RemovedItem(folder.name, kind, name, _time_of_removal(folder), folder)
     return None

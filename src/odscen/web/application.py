@@ -26,6 +26,7 @@ from odscen.web.exchange import exchange_routes
 from odscen.web.large.large_documents import LARGE
 from odscen.web.messages import Health
 from odscen.web.routes import (
+    background_routes,
     carla_routes,
     demand_routes,
     figure_routes,
@@ -131,6 +132,7 @@ def create_app(
 
     for routes in (
         map_routes,
+        background_routes,
         model_routes,
         scenario_routes,
         demand_routes,

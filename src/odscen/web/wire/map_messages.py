@@ -190,6 +190,19 @@ class PlaceInfo(Answer):
     parts: list[Literal["stop_line", "crosswalk", "light", "sign"]]
 
 
+class BackgroundInfo(Answer):
+    """The picture under a map: pixels, and where it lies.
+
+    ``affine`` are the numbers a to f of x = a column + b row + c, y = d column + e row + f, metres.
+    """
+
+    source: str
+    width: int
+    height: int
+    affine: list[float]
+    version: str
+
+
 class MapEdits(RequestBody):
     """All edits of a map, in place of those that it has; ``out`` is the map that gets them."""
 

@@ -1,0 +1,458 @@
+"""A picture under a map: an aerial photograph or a plan, and where on the map it lies.
+
+A place comes from a world file, from the tags of a GeoTIFF, or from points whose places in the
+picture and on the map are both known. Nothing is fetched from anywhere.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
+
+import numpy as np
+
+from odscen.base.atomic_folders import new_folder
+from odscen.base.errors import InputError, MissingDependencyError, in_file
+from odscen.base.stored_files import stored_document
+from odscen.base.system_errors import disk_errors
+from odscen.base.text_files import write_file, write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from odscen.base.arrays import Bounds, FloatArray
+    from odscen.opendrive.road_model import Header
+
+MOST_BYTES = 100 * 1024 * 1024
+MOST_SIDE = 16_384
+"""Pixels of a side: what browsers draw."""
+MOST_PIXELS = 100_000_000
+_FORM, _VERSION = "odscen-background", 1
+_FILE = "background.json"
+_SHIFT = 0.5
+"""Metres by which a straight picture may miss its places once they are on the map's projection."""
+_WORLD_SUFFIXES = (".wld", ".pgw", ".pngw", ".jgw", ".jpgw", ".jpegw", ".tfw", ".tifw")
+
+Affine = tuple[float, float, float, float, float, float]
+"""``a, b, c, d, e, f`` of ``x = a column + b row + c``, ``y = d column + e row + f``, metres of the
+map. Columns and rows count from the upper left corner of the picture."""
+
+MediaType = Literal["image/png", "image/jpeg"]
+_ENDINGS: dict[MediaType, str] = {"image/png": "png", "image/jpeg": "jpg"}
+
+
+class PicturePoint(NamedTuple):
+    """A place that is known in the picture, pixels, and on the map, metres."""
+
+    column: float
+    row: float
+    x: float
+    y: float
+
+
+@dataclass(frozen=True, slots=True)
+class Background:
+    """A picture that lies under a map.
+
+    Attributes
+    ----------
+    path
+        The picture's file.
+    source
+        What the file was called that it came from.
+    media_type
+        PNG or JPEG.
+    width, height
+        Pixels.
+    affine
+        From pixels to metres of the map.
+    """
+
+    path: Path
+    source: str
+    media_type: MediaType
+    width: int
+    height: int
+    affine: Affine
+
+    def to_dict(self) -> dict[str, object]:
+        """As JSON has it."""
+        return {
+            "file": str(self.path),
+            "source": self.source,
+            "media_type": self.media_type,
+            "width": self.width,
+            "height": self.height,
+            "affine": list(self.affine),
+            "bounds": list(self.bounds()),
+        }
+
+    def bounds(self) -> Bounds:
+        """Least and largest x and y, m."""
+        x, y = _apply(self.affine, _corners(self.width, self.height))
+        return float(x.min()), float(y.min()), float(x.max()), float(y.max())
+
+
+class _Decoded(NamedTuple):
+    """A picture that a browser can draw, and the place that its own tags give."""
+
+    content: bytes
+    media_type: MediaType
+    width: int
+    height: int
+    placed: Affine | None = None
+    crs: str | None = None
+
+
+def find_world_file(picture: Path) -> Path | None:
+    """Return the world file beside a picture, by its name."""
+    for suffix in _WORLD_SUFFIXES:
+        for ending in (suffix, suffix.upper()):
+            if (file := picture.with_suffix(ending)).is_file():
+                return file
+    return None
+
+
+def parse_world_file(text: str) -> Affine:
+    """Read the six numbers of a world file, which are for the middles of pixels.
+
+    Raises
+    ------
+    InputError
+        If they are not six numbers, or do not span a plane.
+    """
+    words = text.split()
+    try:
+        a, d, b, e, c, f = (float(word) for word in words)
+    except ValueError:
+        raise InputError(f"a world file has six numbers, not {' '.join(words)[:60]!r}") from None
+    return _checked((a, b, c - (a + b) / 2, d, e, f - (d + e) / 2))
+
+
+def fit_points(points: Sequence[PicturePoint]) -> Affine:
+    """Turn, scale and move a picture so that its points lie where they are on the map.
+
+    Two points say it; of more the one that misses them least is taken.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two points, or all are at one place.
+    """
+    if len(points) < 2:
+        raise InputError(f"two points or more place a picture, not {len(points)}")
+    rows = np.array(points, dtype=np.float64)
+    if not np.isfinite(rows).all():
+        raise InputError("points of a picture must be numbers")
+    # Rows go down and y goes up: a similarity of complex numbers after that.
+    there, here = rows[:, 0] - 1j * rows[:, 1], rows[:, 2] + 1j * rows[:, 3]
+    spread = there - there.mean()
+    if np.abs(spread).max() < 1.0 or np.ptp(here.real) + np.ptp(here.imag) < 1e-3:
+        raise InputError("the points of a picture must be at different places")
+    turn = complex((spread.conj() @ (here - here.mean())) / (spread.conj() @ spread))
+    move = complex(here.mean() - turn * there.mean())
+    return _checked((turn.real, turn.imag, move.real, turn.imag, -turn.real, move.imag))
+
+
+def place_picture(
+    content: bytes,
+    *,
+    source: str,
+    header: Header,
+    bounds: Bounds,
+    world: str | None = None,
+    crs: str | None = None,
+    points: Sequence[PicturePoint] = (),
+) -> tuple[bytes, Background]:
+    """Read a picture and find where it lies on a map.
+
+    Parameters
+    ----------
+    content
+        PNG, JPEG or TIFF.
+    source
+        Name of its file.
+    header, bounds
+        Of the map.
+    world
+        Text of a world file; its numbers are in ``crs``, or in the map's own coordinates.
+    crs
+        Coordinate reference system of the world file, or of a GeoTIFF whose tags do not say it.
+    points
+        Places that are known; they go before everything else.
+
+    Returns
+    -------
+    tuple of bytes and Background
+        The picture as PNG or JPEG, and its place; ``path`` is its name only.
+
+    Raises
+    ------
+    InputError
+        If the picture cannot be read or is too large, nothing says where it lies, or it lies
+        outside the map.
+    MissingDependencyError
+        Of a TIFF, if Pillow is not installed.
+    """
+    decoded = _decode(content)
+    if points:
+        affine = fit_points(points)
+    elif world is not None:
+        affine = _onto_map(parse_world_file(world), crs, header, decoded)
+    elif decoded.placed is not None:
+        affine = _onto_map(decoded.placed, decoded.crs or crs, header, decoded)
+    else:
+        raise InputError(
+            "nothing says where the picture lies: give a world file, a GeoTIFF, or two points"
+        )
+    placed = Background(
+        Path(f"picture.{_ENDINGS[decoded.media_type]}"),
+        source,
+        decoded.media_type,
+        decoded.width,
+        decoded.height,
+        affine,
+    )
+    _refuse_elsewhere(placed.bounds(), bounds)
+    return decoded.content, placed
+
+
+def write_background(folder: Path, content: bytes, background: Background) -> Background:
+    """Put a picture into a folder, in place of the one that is there.
+
+    Raises
+    ------
+    WorkspaceError
+        If it cannot be written.
+    """
+    with disk_errors("the picture under a map"):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with new_folder(folder) as made:
+            write_file(made / background.path.name, content)
+            described = {
+                "format": _FORM,
+                "version": _VERSION,
+                "file": background.path.name,
+                "source": background.source,
+                "media_type": background.media_type,
+                "width": background.width,
+                "height": background.height,
+                "affine": list(background.affine),
+            }
+            write_text(made / _FILE, json.dumps(described, indent=2) + "\n")
+    found = read_background(folder)
+    assert found is not None
+    return found
+
+
+def read_background(folder: Path) -> Background | None:
+    """Read the picture of a folder; ``None`` if there is none.
+
+    Raises
+    ------
+    InputError
+        If what is said of its place is damaged.
+    """
+    file = folder / _FILE
+    if not file.is_file():
+        return None
+    with (
+        in_file(str(file)),
+        stored_document(
+            file.read_bytes(), form=_FORM, version=_VERSION, what="the place of a picture"
+        ) as told,
+    ):
+        media = cast("MediaType", str(told["media_type"]))
+        a, b, c, d, e, f = (float(value) for value in told["affine"])
+        return Background(
+            folder / f"picture.{_ENDINGS[media]}",
+            str(told["source"]),
+            media,
+            *_checked_size(int(told["width"]), int(told["height"])),
+            _checked((a, b, c, d, e, f)),
+        )
+
+
+# --------------------------------------------------------------------------------- the picture
+
+
+def _decode(content: bytes) -> _Decoded:
+    if len(content) > MOST_BYTES:
+        raise InputError(
+            f"a picture may have {MOST_BYTES >> 20} MB, this one has {len(content) >> 20}"
+        )
+    if content.startswith(b"\x89PNG\r\n\x1a\n") and content[12:16] == b"IHDR":
+        width = int.from_bytes(content[16:20], "big")
+        height = int.from_bytes(content[20:24], "big")
+        return _Decoded(content, "image/png", *_checked_size(width, height))
+    if content.startswith(b"\xff\xd8"):
+        return _Decoded(content, "image/jpeg", *_checked_size(*_find_jpeg_size(content)))
+    if content[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
+        return _decode_tiff(content)
+    raise InputError("a picture must be a PNG, JPEG or TIFF file")
+
+
+def _checked_size(width: int, height: int) -> tuple[int, int]:
+    if not 0 < width <= MOST_SIDE or not 0 < height <= MOST_SIDE or width * height > MOST_PIXELS:
+        raise InputError(
+            f"a picture may have {MOST_SIDE} pixels a side and {MOST_PIXELS // 1_000_000} million "
+            f"in all, this one has {width} x {height}"
+        )
+    return width, height
+
+
+def _find_jpeg_size(content: bytes) -> tuple[int, int]:
+    """Width and height of the first frame of a JPEG file."""
+    at = 2
+    while at + 9 < len(content) and content[at] == 0xFF:
+        marker, length = content[at + 1], int.from_bytes(content[at + 2 : at + 4], "big")
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            height, width = (int.from_bytes(content[at + k : at + k + 2], "big") for k in (5, 7))
+            return width, height
+        at += 2 + max(length, 2)
+    raise InputError("the JPEG file is cut off: it has no frame")
+
+
+def _decode_tiff(content: bytes) -> _Decoded:
+    """Write a TIFF as PNG, which browsers draw, and read the tags of GeoTIFF 1.1."""
+    try:
+        from PIL import Image, UnidentifiedImageError
+    except ImportError:
+        raise MissingDependencyError(
+            "TIFF files need Pillow: pip install 'odscen[png]'; or save the picture as PNG "
+            "with a world file"
+        ) from None
+    try:
+        with (
+            warnings.catch_warnings(action="error"),  # Pillow warns of what is damaged, and goes on
+            Image.open(io.BytesIO(content), formats=("TIFF",)) as image,
+        ):
+            width, height = _checked_size(*image.size)
+            if image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA", "CMYK", "YCbCr"):
+                raise InputError(
+                    f"a TIFF of the mode {image.mode} has no colours of 8 bits; save it with them"
+                )
+            tags = dict(getattr(image, "tag_v2", {}))
+            out = io.BytesIO()
+            image.convert("RGBA" if image.mode in ("LA", "RGBA") else "RGB").save(out, "PNG")
+    except InputError:
+        raise
+    except (UnidentifiedImageError, OSError, ValueError, LookupError, SyntaxError, TypeError,
+            ArithmeticError, Warning) as error:  # fmt: skip
+        raise InputError(f"the TIFF file cannot be read: {error}") from error
+    placed, crs = _read_geotiff_tags(tags)
+    return _Decoded(out.getvalue(), "image/png", width, height, placed, crs)
+
+
+def _read_geotiff_tags(tags: dict[int, object]) -> tuple[Affine | None, str | None]:
+    """Place and coordinate reference system that a GeoTIFF tells, OGC 19-008r4."""
+    scale, tie, matrix, keys = (tags.get(tag) for tag in (33550, 33922, 34264, 34735))
+    found: dict[int, int] = {}
+    try:
+        if keys is not None:
+            numbers = [int(value) for value in cast("Sequence[int]", keys)]
+            rows = [numbers[at : at + 4] for at in range(4, len(numbers) - 3, 4)]
+            found = {key: value for key, location, _, value in rows if location == 0}
+        if matrix is not None:
+            m = [float(value) for value in cast("Sequence[float]", matrix)]
+            affine = (m[0], m[1], m[3], m[4], m[5], m[7])
+        elif scale is not None and tie is not None:
+            sx, sy = (float(value) for value in cast("Sequence[float]", scale)[:2])
+            column, row, _, x, y = (float(v) for v in cast("Sequence[float]", tie)[:5])
+            affine = (sx, 0.0, x - sx * column, 0.0, -sy, y + sy * row)
+        else:
+            return None, None
+    except (TypeError, ValueError, IndexError) as error:
+        raise InputError(f"the tags of the GeoTIFF are damaged: {error}") from error
+    if found.get(1025) == 2:  # places are those of the middles of pixels
+        a, b, c, d, e, f = affine
+        affine = (a, b, c - (a + b) / 2, d, e, f - (d + e) / 2)
+    code = found.get(3072) or found.get(2048)
+    return _checked(affine), f"EPSG:{code}" if code and code < 32_767 else None
+
+
+# ----------------------------------------------------------------------------------- its place
+
+
+def _checked(affine: Affine) -> Affine:
+    a, b, _, d, e, _ = affine
+    if not all(map(math.isfinite, affine)) or abs(a * e - b * d) < 1e-16:
+        raise InputError("the numbers that place the picture do not span a plane")
+    return affine
+
+
+def _corners(width: int, height: int) -> FloatArray:
+    """Corners and middle of a picture, (5, 2): column and row."""
+    w, h = float(width), float(height)
+    return np.array([(0.0, 0.0), (w, 0.0), (w, h), (0.0, h), (w / 2, h / 2)])
+
+
+def _apply(affine: Affine, pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
+    a, b, c, d, e, f = affine
+    column, row = pixels[:, 0], pixels[:, 1]
+    return a * column + b * row + c, d * column + e * row + f
+
+
+def _onto_map(affine: Affine, crs: str | None, header: Header, picture: _Decoded) -> Affine:
+    """Carry a place from its coordinate reference system to the map's coordinates."""
+    if crs is None:
+        return affine
+    convert = _to_map_metres(crs, header)
+    pixels = _corners(picture.width, picture.height)
+    x, y = convert(*_apply(affine, pixels))
+    if not (np.isfinite(x).all() and np.isfinite(y).all()):
+        raise InputError(f"the picture lies where {crs} cannot be carried over to the map")
+    terms = np.column_stack((pixels, np.ones(len(pixels))))
+    fitted = np.linalg.lstsq(terms, np.column_stack((x, y)), rcond=None)[0]
+    missed = float(np.hypot(*(terms @ fitted - np.column_stack((x, y))).T).max())
+    if missed > _SHIFT:
+        raise InputError(
+            f"in the map's projection the picture is bent by {missed:.1f} m; cut it smaller, or "
+            "save it in the map's projection"
+        )
+    (a, d), (b, e), (c, f) = fitted.tolist()
+    return _checked((a, b, c, d, e, f))
+
+
+def _to_map_metres(
+    crs: str, header: Header
+) -> Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+    import pyproj
+
+    if header.crs is None:
+        raise InputError(
+            "the map has no georeference that is understood; place the picture by two points",
+            element="geoReference",
+        )
+    try:
+        transformer = pyproj.Transformer.from_crs(crs, header.crs, always_xy=True)
+    except pyproj.exceptions.ProjError as error:
+        raise InputError(f"no coordinate reference system: {crs[:60]!r}") from error
+    x0, y0, _, hdg = header.offset
+
+    def convert(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        east, north = transformer.transform(x, y)
+        east, north = east - x0, north - y0
+        cos, sin = math.cos(hdg), math.sin(hdg)
+        return cos * east + sin * north, cos * north - sin * east
+
+    return convert
+
+
+def _refuse_elsewhere(picture: Bounds, map_bounds: Bounds) -> None:
+    apart = max(
+        picture[0] - map_bounds[2],
+        map_bounds[0] - picture[2],
+        picture[1] - map_bounds[3],
+        map_bounds[1] - picture[3],
+    )
+    if apart > 0.0:
+        raise InputError(
+            f"the picture lies {apart:,.0f} m beside the map; name its coordinate reference system "
+            "(EPSG:...), or place it by two points"
+        )

@@ -1,0 +1,144 @@
+"""A picture under a map lies where a world file, a GeoTIFF or two points say."""
+
+from __future__ import annotations
+
+import io
+import math
+import struct
+from pathlib import Path
+
+import numpy as np
+import pyproj
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image, TiffImagePlugin
+
+from odscen.base.errors import InputError
+from odscen.maps.background import PicturePoint, _apply, fit_points, parse_world_file, place_picture
+from odscen.opendrive.parse import parse
+
+MAPS = Path(__file__).parents[2] / "maps"
+HEADER = parse((MAPS / "bus_street.xodr").read_bytes()).header
+BOUNDS = (-100.0, -100.0, 100.0, 100.0)
+LOCAL = "+proj=tmerc +lat_0=48 +lon_0=11 +k=1 +datum=WGS84 +units=m +no_defs"
+
+
+def picture(width: int = 40, height: int = 20, form: str = "PNG", **more: object) -> bytes:
+    out = io.BytesIO()
+    Image.new("RGB", (width, height), (90, 120, 60)).save(out, form, **more)
+    return out.getvalue()
+
+
+def geotiff(*, epsg: int | None, x: float, y: float, size: float, point: bool = False) -> bytes:
+    tags = TiffImagePlugin.ImageFileDirectory_v2()
+    tags[33550], tags.tagtype[33550] = (size, size, 0.0), 12
+    tags[33922], tags.tagtype[33922] = (0.0, 0.0, 0.0, x, y, 0.0), 12
+    keys = [(1025, 0, 1, 2 if point else 1)] + ([(3072, 0, 1, epsg)] if epsg else [])
+    tags[34735] = (1, 1, 0, len(keys), *(number for key in keys for number in key))
+    tags.tagtype[34735] = 3
+    return picture(form="TIFF", tiffinfo=tags)
+
+
+def places(affine: tuple[float, ...], *pixels: tuple[float, float]) -> list[tuple[float, float]]:
+    x, y = _apply(affine, np.array(pixels, dtype=float))  # type: ignore[arg-type]
+    return list(zip(x.tolist(), y.tolist(), strict=True))
+
+
+def test_a_world_file_is_for_the_middle_of_the_first_pixel() -> None:
+    affine = parse_world_file("0.5\n0\n0\n-0.5\n10.25\n49.75\n")
+    assert places(affine, (0, 0), (0.5, 0.5), (40, 20)) == [(10, 50), (10.25, 49.75), (30, 40)]
+
+
+@given(
+    turn=st.floats(-math.pi, math.pi),
+    scale=st.floats(0.01, 10.0),
+    x=st.floats(-1e6, 1e6),
+    y=st.floats(-1e6, 1e6),
+)
+def test_two_points_turn_scale_and_move_the_picture(
+    turn: float, scale: float, x: float, y: float
+) -> None:
+    def on_map(column: float, row: float) -> tuple[float, float]:
+        u, v = scale * column, -scale * row
+        return (
+            x + u * math.cos(turn) - v * math.sin(turn),
+            y + u * math.sin(turn) + v * math.cos(turn),
+        )
+
+    affine = fit_points([PicturePoint(c, r, *on_map(c, r)) for c, r in ((10, 5), (310, 120))])
+    for pixel in ((0.0, 0.0), (400.0, 0.0), (17.0, 230.0)):
+        assert places(affine, pixel)[0] == pytest.approx(on_map(*pixel), abs=1e-6 * (1 + abs(x)))
+
+
+def test_a_geotiff_in_utm_lies_where_its_corners_are_on_the_map() -> None:
+    east, north = pyproj.Transformer.from_crs(LOCAL, "EPSG:25832", always_xy=True).transform(
+        -20.0, 30.0
+    )
+    content, placed = place_picture(
+        geotiff(epsg=25832, x=east, y=north, size=0.5),
+        source="photo.tif",
+        header=HEADER,
+        bounds=BOUNDS,
+    )
+    assert content.startswith(b"\x89PNG")
+    assert (placed.media_type, placed.width, placed.height) == ("image/png", 40, 20)
+    back = pyproj.Transformer.from_crs("EPSG:25832", LOCAL, always_xy=True)
+    corners = [(0.0, 0.0), (40.0, 0.0), (40.0, 20.0)]
+    for corner, at in zip(corners, places(placed.affine, *corners), strict=True):
+        there = back.transform(east + 0.5 * corner[0], north - 0.5 * corner[1])
+        assert at == pytest.approx(there, abs=0.001)
+
+
+def test_a_geotiff_whose_places_are_of_pixels_lies_half_a_pixel_further() -> None:
+    lying = [
+        place_picture(
+            geotiff(epsg=None, x=10.0, y=20.0, size=1.0, point=point),
+            source="photo.tif",
+            header=HEADER,
+            bounds=BOUNDS,
+        )[1].affine
+        for point in (False, True)
+    ]
+    assert places(lying[0], (0, 0)) == [(10.0, 20.0)]
+    assert places(lying[1], (0.5, 0.5)) == [(10.0, 20.0)]
+
+
+def test_the_size_of_a_jpeg_is_read_without_decoding_it() -> None:
+    points = [PicturePoint(0, 0, 0, 0), PicturePoint(60, 0, 60, 0)]
+    content = picture(60, 30, "JPEG", exif=b"Exif\0\0" + bytes(500))
+    kept, placed = place_picture(
+        content, source="p.jpg", header=HEADER, bounds=BOUNDS, points=points
+    )
+    assert kept == content
+    assert (placed.media_type, placed.width, placed.height) == ("image/jpeg", 60, 30)
+    assert placed.bounds() == pytest.approx((0, -30, 60, 0))
+
+
+def huge_png() -> bytes:
+    return picture()[:16] + struct.pack(">II", 20_000, 20_000) + picture()[24:]
+
+
+@pytest.mark.parametrize(
+    ("content", "more", "problem"),
+    [
+        (b"GIF89a", {}, "a picture must be a PNG, JPEG or TIFF file"),
+        (huge_png(), {}, "this one has 20000 x 20000"),
+        (picture(form="JPEG")[:30], {}, "the JPEG file is cut off"),
+        (picture(form="TIFF")[:60], {}, "the TIFF file cannot be read"),
+        (picture(), {}, "nothing says where the picture lies"),
+        (picture(), {"world": "1 2 3"}, "a world file has six numbers, not '1 2 3'"),
+        (picture(), {"world": "0 0 0 0 5 5"}, "do not span a plane"),
+        (picture(), {"world": "1 0 0 -1 nan 5"}, "do not span a plane"),
+        (picture(), {"world": "1 0 0 -1 0 0", "crs": "EPSG:nine"}, "no coordinate reference"),
+        (picture(), {"world": "1 0 0 -1 500000 5000000"}, "4,999,880 m beside the map"),
+        (picture(), {"points": [PicturePoint(1, 1, 0, 0)]}, "two points or more"),
+        (picture(), {"points": [PicturePoint(1, 1, 0, 0)] * 2}, "must be at different places"),
+    ],
+)
+def test_what_cannot_be_placed_is_refused_with_its_reason(
+    content: bytes, more: dict[str, object], problem: str
+) -> None:
+    with pytest.raises(InputError) as refused:
+        place_picture(content, source="p", header=HEADER, bounds=BOUNDS, **more)  # type: ignore[arg-type]
+    assert problem in str(refused.value)
