@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from odscen.base.arrays import Bounds, FloatArray
     from odscen.opendrive.road_model import Header
 
+BACKGROUNDS = ".backgrounds"
+"""Folder beside maps with the pictures that lie under them, and inside a removed map."""
 MOST_BYTES = 100 * 1024 * 1024
 MOST_SIDE = 16_384
 """Pixels of a side: what browsers draw."""

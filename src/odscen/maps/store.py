@@ -24,6 +24,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.convert.model.conversion_settings import USUAL, ConversionSettings
 from odscen.maps.allowances import BY_SIZE
 from odscen.maps.background import (
+    BACKGROUNDS,
     MOST_BYTES,
     find_world_file,
     place_picture,
@@ -34,7 +35,6 @@ from odscen.maps.folder_names import check_name, is_name, name_from_file
 from odscen.maps.importers.base import DETECTED
 from odscen.maps.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.maps.map_files import read_map_file
-from odscen.maps.wastebasket import BACKGROUNDS
 from odscen.simulators.assets import assets_in
 
 if TYPE_CHECKING:

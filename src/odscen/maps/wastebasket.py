@@ -20,6 +20,7 @@ from odscen.base.atomic_folders import discard
 from odscen.base.errors import ConflictError, NotFoundError
 from odscen.base.folder_locks import locked
 from odscen.base.system_errors import disk_errors
+from odscen.maps.background import BACKGROUNDS
 from odscen.maps.folder_names import check_name
 
 if TYPE_CHECKING:
@@ -36,8 +37,6 @@ SCENARIO_SUFFIX = ".scenario.json"
 """Ending of scenario files."""
 HISTORY = ".history"
 """Folder beside scenarios with what undo goes back to, and inside a removed scenario."""
-BACKGROUNDS = ".backgrounds"
-"""Folder beside maps with the pictures that lie under them, and inside a removed map."""
 _COMPANIONS: dict[str, str] = {"scenario": HISTORY, "map": BACKGROUNDS}
 """What goes along with what is removed."""
 
