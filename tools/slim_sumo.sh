@@ -8,3 +8,4 @@ for file in libsumo.libs/*; do
     if cmp -s "$file" "$same"; then ln -f "$same" "$file"; fi
 done
 rm -rf sumo_data sumo/data sumo/lib64 sumo/bin/sumo-gui sumo/bin/netedit
+rm -rf sumo/tools/contributed sumo/tools/game
