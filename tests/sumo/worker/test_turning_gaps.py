@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import Counter
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from odscen.sumo.worker.simulation.session import open_session
+from odscen.sumo.worker.simulation.turning_gaps import TurningGaps
 from tests.convert.maps import converted, named
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 LEFT, ONCOMING = "1.0.f 1.1.f 4.1.b 4.0.b", "3.0.f 3.1.f 1.1.b 1.0.b"
@@ -99,3 +102,61 @@ def test_a_bus_that_turns_waits_as_sumo_has_it(net: Path, tmp_path: Path) -> Non
     """Its sides leave its path in a turn, and it is long."""
     assert not turns_between(net, tmp_path, 9.0, kinds=("bus", "car"))
     assert turns_between(net, tmp_path, 15.0, kinds=("bus", "car"))
+
+
+STRAIGHT = "1.0.f 1.1.f 3.1.b 3.0.b"
+
+
+def drive(net: Path, folder: Path, routes: dict[str, str], *, rerouted: str = "") -> Counter[str]:
+    """Let cars depart each 2 s on their routes for a minute; how often SUMO was asked for what."""
+    file, lights = folder / "routes.xml", folder / "lights.xml"
+    lights.write_text(LIGHT)
+    file.write_text(
+        f"<routes>{CAR}"
+        + "".join(
+            f'<vehicle id="{name}" type="car" depart="{2 * number}" departLane="1">'
+            f'<route edges="{edges}"/></vehicle>'
+            for number, (name, edges) in enumerate(routes.items())
+        )
+        + "</routes>"
+    )
+    asked: Counter[str] = Counter()
+
+    def count_calls(domain: str, name: str) -> Callable[..., Any]:
+        call = getattr(getattr(session._sumo, domain), name)
+
+        def counted(*arguments: Any) -> Any:
+            asked[name] += 1
+            return call(*arguments)
+
+        return counted
+
+    arguments = ["-n", net, "-r", file, "-a", lights, "--step-length", "0.5", "--no-step-log"]
+    with open_session([str(argument) for argument in arguments]) as session:
+        gaps = TurningGaps(session._sumo, session._errors, session.lanes, count_calls)
+        session.turning_gaps = gaps
+        while session.time < 60.0 and session.expected():
+            gaps.before_step()
+            session.step()
+            if rerouted and session.time == 4.0:
+                before = session._sumo.vehicle.getRouteID("a")
+                assert session.set_route("a", rerouted.split())
+                assert session._sumo.vehicle.getRouteID("a") != before
+        assert session.time == 60.0 or not session.expected()
+    return asked
+
+
+def test_who_makes_no_such_turn_is_looked_at_once(net: Path, tmp_path: Path) -> None:
+    routes = {f"v{number}": STRAIGHT for number in range(20)}
+    asked = drive(net, tmp_path, routes)
+    assert asked["getLaneID"] == asked["getRouteIndex"] == 20
+    assert asked["getLastStepVehicleIDs"] == 0
+
+
+def test_who_turns_is_looked_at_when_it_may_have_come_near(net: Path, tmp_path: Path) -> None:
+    asked = drive(net, tmp_path, {"a": LEFT})
+    # It drives for some 25 s, of which some 6 s are near the turn and in it.
+    assert 8 <= asked["getLaneID"] <= 30
+    assert 0 < asked["getLastStepVehicleIDs"] <= 200
+    changed = drive(net, tmp_path, {"a": STRAIGHT}, rerouted=LEFT)
+    assert 0 < changed["getLastStepVehicleIDs"] <= 200

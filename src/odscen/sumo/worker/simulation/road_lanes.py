@@ -33,9 +33,13 @@ class RoadLanes:
     @cached_property
     def internal(self) -> frozenset[str]:
         """Lanes for vehicles inside junctions: those that connections lead over."""
+        return frozenset(link[4] for links in self.links_of.values() for link in links if link[4])
+
+    @cached_property
+    def links_of(self) -> dict[str, tuple[Any, ...]]:
+        """Connections from each lane, as SUMO gives them; with their states at the begin."""
         lane = self._sumo.lane
-        links = (link for name in lane.getIDList() for link in lane.getLinks(name))
-        return frozenset(link[4] for link in links if link[4])
+        return {name: lane.getLinks(name) for name in lane.getIDList()}
 
     def admits(self, lane: str, kind: str) -> bool:
         """Whether vehicles of a class of SUMO's may use a lane."""

@@ -244,6 +244,7 @@ class Session:
             self._sumo.vehicle.setRoute(vehicle, list(edges))
         except self._errors:
             return False
+        self.turning_gaps.look_again(vehicle)
         return True
 
     def take_out(self, vehicle: str) -> None:

@@ -7,22 +7,31 @@ place where the paths cross, as people do: it may go behind one whose body is pa
 there, and before one who gets there after its own body has left, by :data:`MARGIN`. To SUMO these
 are vehicles to ignore for the moment (``junctionModel.ignoreIDs``); whoever is not, it gives way to
 as ever, and so it does to all on its own side, to those who turn into the same road, and to people.
+
+A step costs little, for most vehicles are not looked at: how far the next such turn of a route is
+says when a vehicle can be there at the earliest, and nobody asks for it before; who waits at red is
+not asked, and the geometry of a turn is found when the first vehicle comes that makes it.
 """
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections import defaultdict
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from odscen.sumo.worker.simulation.foreign_traffic import is_foreign
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 
+    from odscen.base.arrays import FloatArray
     from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
 MARGIN = 0.5
@@ -44,46 +53,69 @@ _STANDING = 2.0
 _WIDTH = 2.1
 """Metres of the widest body that is looked at, and what lies between two who pass."""
 _FLATTEST = math.radians(15.0)
-_MOST_KEPT = 10_000
-"""Vehicles whose bodies are kept in mind."""
+_MOST_KEPT = 2_000
+"""Vehicles, and routes, that are kept in mind; a route takes some kilobytes."""
+_LOOK_AGAIN = 60.0
+"""Seconds after which a vehicle is looked at again in any case, as it may have another route."""
+_EDGES = 6
+"""Edges within :data:`_SIGHT`, at most."""
+_RED = "r"
 _OBEYING = ("s", "w", "=", "Z")
 """States of links by whose rule a vehicle stops in any case, or goes in turn."""
 _IGNORED = "junctionModel.ignoreIDs"
 
 _Point = tuple[float, float]
+_Pair = tuple[str, str]
+"""Edges that a route leads from and to."""
 
 
-class _Crossing(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Crossing:
     """A path that comes towards a turn and crosses it.
 
-    ``here`` and ``there`` are metres from where one waits, and from the stop line of the other,
-    to where the paths cross, ``half`` those before and behind it at which bodies may touch;
-    ``lanes`` has the lanes that lead there, each with the metres from its begin to that stop line
-    (negative inside the junction), ``inside`` the speed of the path in the junction, m/s.
+    ``pair`` are the edges that it leads from and to, ``here`` and ``there`` metres from where one
+    waits, and from the stop line of the other, to where the paths cross, ``half`` those before and
+    behind it at which bodies may touch; ``inside`` is the speed of the path in the junction, m/s.
     """
 
-    source: str
-    target: str
-    lanes: tuple[tuple[str, float], ...]
+    pair: _Pair
     here: float
     there: float
     half: float
     inside: float
 
 
-class _Turn(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Turn:
     """A turn: the lane up to where one waits and its length, and who crosses behind that place.
 
     That is a place inside the junction, or else the stop line. ``speed`` is that of the lane behind
-    it, m/s; ``watched`` are the lanes of all who cross.
+    it, m/s; ``light`` names the traffic light, empty without one, and ``index`` the link there.
+    ``approaches`` are the lanes from which others come, each with the paths that it leads over, the
+    metres from its begin to the stop lines there, and whether it is inside the junction.
     """
 
     waiting: str
     length: float
     speed: float
-    target: str
-    crossings: tuple[_Crossing, ...]
-    watched: tuple[str, ...]
+    light: str
+    index: int
+    approaches: tuple[tuple[str, tuple[tuple[_Crossing, float, bool], ...]], ...]
+
+
+class _Route(NamedTuple):
+    """A route by its name: the edge after each, turns by the place in it of the edge before.
+
+    ``metres`` and ``seconds`` are those from its begin to the end of each edge, at least, the
+    latter at the limit. Of a route that comes by an edge twice, ``after`` is ``None``.
+    """
+
+    name: str
+    after: dict[str, str] | None
+    places: list[int]
+    turns: list[dict[str, _Turn | None]]
+    metres: list[float]
+    seconds: list[float]
 
 
 class _Body(NamedTuple):
@@ -122,13 +154,22 @@ class TurningGaps:
             native("vehicle", f"get{what}")
             for what in ("LaneID", "LanePosition", "Speed", "AllowedSpeed")
         )
-        self._route_of, self._index_of = (
-            native("vehicle", f"getRoute{what}") for what in ("", "Index")
+        self._route_of, self._route_name_of, self._index_of = (
+            native("vehicle", f"getRoute{what}") for what in ("", "ID", "Index")
         )
-        self._number_on, self._on_lane = (
-            native("lane", f"getLastStepVehicle{what}") for what in ("Number", "IDs")
+        self._on_lane = native("lane", "getLastStepVehicleIDs")
+        self._departed_number, self._departed = (
+            native("simulation", f"getDeparted{what}") for what in ("Number", "IDList")
         )
+        self._state_of = native("trafficlight", "getRedYellowGreenState")
         self._bodies: dict[str, _Body] = {}
+        self._routes: dict[str, _Route] = {}
+        self._turns: dict[_Pair, dict[str, _Turn | None]] = {}
+        self._step, self._step_length = -1, 0.0
+        self._due: dict[int, list[str]] = {}
+        self._due_of: dict[str, int] = {}
+        self._edges: dict[str, tuple[float, float]] = {}
+        self._near: dict[str, tuple[str, dict[str, _Turn | None]]] = {}
 
     def before_step(
         self, *, only: frozenset[str] | None = None, moved: Collection[str] = ()
@@ -142,45 +183,164 @@ class TurningGaps:
         moved
             Who is driven by something else.
         """
-        seen: set[str] = set()
-        for name, lane in self._find_turning():
-            if name in moved or is_foreign(name) or (only is not None and name not in only):
+        if self._step < 0:
+            self._step_length = float(self._sumo.simulation.getDeltaT())
+        if self._step_length > _LONGEST_STEP:
+            return
+        self._step += 1
+        self._find_near(only)
+        if not self._near:
+            return
+        lights: dict[str, str] = {}
+        for name, (route, lanes) in list(self._near.items()):
+            try:
+                lane = self._lane_of(name)
+            except self._errors:  # it has arrived
+                self._leave(name)
                 continue
-            turn = self._turn_of(name, lane)
-            if turn is not None:
-                self._set_ignored(name, self._passed_by(name, turn, lane))
-                seen.add(name)
-        for name in sorted(self._given.keys() - seen):
-            self._set_ignored(name, [])
+            turn = lanes.get(lane)
+            if turn is None or name in moved:
+                self._set_ignored(name, ())
+                if lane not in lanes:
+                    self._leave(name)
+                    self._plan_look(name, 1)
+            elif lane != turn.waiting:
+                self._set_ignored(name, self._passed_on_way(name, turn))
+            elif not self._may_go(turn, lane, lights):
+                self._set_ignored(name, ())
+            elif self._route_name_of(name) != route:
+                self._leave(name)
+                self._plan_look(name, 1)
+            else:
+                self._set_ignored(name, self._passed_by(name, turn))
 
-    def _turn_of(self, name: str, lane: str) -> _Turn | None:
-        """The turn that a vehicle is about to make, or makes."""
-        turns = self._turns[lane]
-        if lane in self._lanes.internal:
-            turn = turns[0]
+    def look_again(self, name: str) -> None:
+        """Look at a vehicle that has another route."""
+        if name in self._due_of:
+            self._plan_look(name, 1)
+
+    def forget(self) -> None:
+        """Let all give way as SUMO has it, before the state is saved."""
+        for name in sorted(self._given):
+            self._set_ignored(name, ())
+
+    def _set_ignored(self, name: str, others: Collection[str]) -> None:
+        """Have a vehicle ignore others, and nobody else."""
+        if not others and name not in self._given:
+            return
+        wanted = frozenset(others)
+        if wanted == self._given.get(name):
+            return
+        with suppress(*self._errors):  # it may be gone
+            self._sumo.vehicle.setParameter(name, _IGNORED, " ".join(sorted(wanted)))
+        if wanted:
+            self._given[name] = wanted
         else:
-            if turns[0].length - self._position_of(name) > _NEAR:
-                return None
-            after = self._route_of(name)[self._index_of(name) + 1 :][:1]
-            chosen = next((turn for turn in turns if after and turn.target == after[0]), None)
-            if chosen is None:
-                return None
-            turn = chosen
-        met = any(self._number_on(there) for there in turn.watched)
-        return turn if met and self._body_of(name).length <= _LONGEST else None
+            del self._given[name]
 
-    def _find_turning(self) -> list[tuple[str, str]]:
-        """Vehicles on lanes that turns begin on or lead over, with these lanes."""
-        if not self._turns or self._sumo.simulation.getDeltaT() > _LONGEST_STEP:
-            return []
-        names, lane_of = self._sumo.vehicle.getIDList(), self._lane_of
-        if len(names) < 2:
-            return []
-        if len(names) < len(self._turns):  # asking for vehicles is cheaper than for lanes
-            places = [(name, lane_of(name)) for name in names]
-            return [(name, lane) for name, lane in places if lane in self._turns]
-        number, on_lane = self._number_on, self._on_lane
-        return [(name, lane) for lane in self._turns if number(lane) for name in on_lane(lane)]
+    # ------------------------------------------------------------------------ who is near a turn
+
+    def _find_near(self, only: frozenset[str] | None) -> None:
+        """Look at those who have departed, and at those who may have come near a turn."""
+        if self._step == 0:
+            names: Iterable[str] = self._sumo.vehicle.getIDList()
+        elif self._departed_number():
+            names = self._departed()
+        else:
+            names = ()
+        for name in names:
+            if not is_foreign(name) and (only is None or name in only):
+                self._due_of[name] = self._step
+                self._due.setdefault(self._step, []).append(name)
+        for name in self._due.pop(self._step, ()):
+            if self._due_of.get(name) == self._step:
+                del self._due_of[name]
+                with suppress(*self._errors):  # it may be gone
+                    self._look(name)
+
+    def _plan_look(self, name: str, steps: int) -> None:
+        due = self._step + steps
+        self._due_of[name] = due
+        self._due.setdefault(due, []).append(name)
+
+    def _look(self, name: str) -> None:
+        """Note a vehicle that is near a turn; else say when it may be, at the earliest."""
+        length, gains, factor = self._body_of(name)
+        if length > _LONGEST:
+            return
+        lane, index = self._lane_of(name), self._index_of(name)
+        if not lane or index < 0:  # it is being teleported
+            self._plan_look(name, self._steps(1.0))
+            return
+        route, inside = self._route_named(name), lane in self._lanes.internal
+        number = bisect_left(route.places, index)
+        if inside and number < len(route.places) and route.places[number] == index:
+            if lane in route.turns[number]:
+                self._near[name] = route.name, route.turns[number]
+                return
+            number += 1
+        again = _LOOK_AGAIN
+        if number < len(route.places):
+            place, passed = route.places[number], index if inside else index - 1
+            rest = route.metres[place] - (route.metres[passed] if passed >= 0 else 0.0) - _NEAR
+            rest -= 0.0 if inside else self._position_of(name)
+            if rest <= 0.0:
+                self._near[name] = route.name, route.turns[number]
+                return
+            speed = self._speed_of(name)
+            gaining = (math.sqrt(speed * speed + 2.0 * gains * rest) - speed) / gains
+            driving = route.seconds[place] - route.seconds[index]
+            if place > index:
+                last = route.seconds[place] - route.seconds[place - 1]
+                driving -= last * min(1.0, _NEAR / (route.metres[place] - route.metres[place - 1]))
+            again = min(again, max(gaining, driving / factor))
+        self._plan_look(name, self._steps(again))
+
+    def _route_named(self, name: str) -> _Route:
+        """The route of a vehicle, with the turns on it."""
+        route_name = self._route_name_of(name)
+        known = self._routes.get(route_name)
+        if known is not None:
+            return known
+        if len(self._routes) >= _MOST_KEPT:
+            self._routes.clear()
+        edges = self._route_of(name)
+        after = dict(pairwise(edges)) if len(set(edges)) == len(edges) else None
+        known = _Route(route_name, after, [], [], [], [])
+        metres = seconds = 0.0
+        for edge in edges:
+            length, speed = self._shortest(edge)
+            metres, seconds = metres + length, seconds + length / speed
+            known.metres.append(metres)
+            known.seconds.append(seconds)
+        for place, pair in enumerate(pairwise(edges)):
+            turns = self._turns.get(pair)
+            if turns is None:
+                turns = self._turns[pair] = self._find_turns(pair)
+            if turns:
+                known.places.append(place)
+                known.turns.append(turns)
+        self._routes[route_name] = known
+        return known
+
+    def _leave(self, name: str) -> None:
+        self._set_ignored(name, ())
+        del self._near[name]
+
+    def _may_go(self, turn: _Turn, lane: str, lights: dict[str, str]) -> bool:
+        """Whether one who has not begun to turn is to look for a gap.
+
+        Parameters
+        ----------
+        lights
+            States of lights that have been asked for.
+        """
+        if not turn.light or lane in self._lanes.internal:
+            return True
+        shown = lights.get(turn.light)
+        if shown is None:
+            shown = lights[turn.light] = self._state_of(turn.light)
+        return shown[turn.index] != _RED
 
     def _body_of(self, name: str) -> _Body:
         body = self._bodies.get(name)
@@ -192,173 +352,198 @@ class TurningGaps:
             self._bodies[name] = body
         return body
 
-    def forget(self) -> None:
-        """Let all give way as SUMO has it, before the state is saved."""
-        for name in sorted(self._given):
-            self._set_ignored(name, [])
+    # ------------------------------------------------------------------------ gaps
 
-    def _set_ignored(self, name: str, others: Sequence[str]) -> None:
-        wanted = frozenset(others)
-        if wanted == self._given.get(name, frozenset()):
-            return
-        with suppress(*self._errors):  # it may be gone
-            self._sumo.vehicle.setParameter(name, _IGNORED, " ".join(others))
-        if others:
-            self._given[name] = wanted
-        else:
-            self._given.pop(name, None)
+    def _passed_by(self, name: str, turn: _Turn) -> list[str]:
+        """Those whom one who has not begun to turn need not wait for.
 
-    def _passed_by(self, name: str, turn: _Turn, lane: str) -> list[str]:
-        """Those whom a vehicle need not wait for."""
-        length, gains, factor = self._body_of(name)
-        front = self._position_of(name) - (turn.length if lane == turn.waiting else 0.0)
-        speed, limit = self._speed_of(name), turn.speed * factor
-        free, kept = set[str](), set[str]()
-        for crossing in turn.crossings:
-            enters = _seconds(crossing.here - crossing.half - front, speed, gains, limit)
-            leaves = _seconds(crossing.here + crossing.half + length - front, speed, gains, limit)
-            margin = MARGIN if lane == turn.waiting else 0.0
-            for other, to_line in self._find_oncoming(crossing, turn.target):
-                passes = self._passes(other, to_line, crossing)
-                if passes is None:
-                    continue
-                clear = passes[0] > leaves + margin or passes[1] + _BEHIND < enters
-                (free if clear else kept).add(other)
-        if lane != turn.waiting:  # on its way: to change its mind would be to stop in the way
-            return sorted(free | self._given.get(name, frozenset()))
-        # Who has to wait for one starts for none: it would be late for the others.
-        return [] if kept else sorted(free)
-
-    def _find_oncoming(self, crossing: _Crossing, target: str) -> list[tuple[str, float]]:
-        """Who is on a path, with the metres to its stop line, negative behind it."""
-        found = []
-        for lane, to_line in crossing.lanes:
-            for name in self._on_lane(lane):
-                inside = lane in self._lanes.internal and to_line <= 0.0
-                if inside or self._drives_over(name, crossing, target):
-                    found.append((name, to_line - self._position_of(name)))
-        return found
-
-    def _drives_over(self, name: str, crossing: _Crossing, target: str) -> bool:
-        """Whether a vehicle before the junction is to take a path."""
-        vehicle = self._sumo.vehicle
-        begin = max(0, vehicle.getRouteIndex(name))
-        route = vehicle.getRoute(name)[begin : begin + 6]
-        if crossing.source not in route[:-1]:
-            return False
-        after = route[route.index(crossing.source) + 1]
-        return bool(after == crossing.target and after != target)
-
-    def _passes(self, name: str, to_line: float, crossing: _Crossing) -> tuple[float, float] | None:
-        """Seconds to when a vehicle is where paths cross, at the earliest, and to when it is past.
-
-        ``None`` if nothing is sure.
+        Who has to wait for one starts for none: it would be late for the others.
         """
+        free = []
+        for other, passes, own in self._find_oncoming(name, turn, waits=True):
+            if passes[0] <= own[1] and passes[1] + _BEHIND >= own[0]:
+                return []
+            free.append(other)
+        return free
+
+    def _passed_on_way(self, name: str, turn: _Turn) -> Collection[str]:
+        """Those whom one who turns need not wait for.
+
+        To change its mind would be to stop in the way.
+        """
+        free = [
+            other
+            for other, passes, own in self._find_oncoming(name, turn, waits=False)
+            if passes[0] > own[1] or passes[1] + _BEHIND < own[0]
+        ]
+        given = self._given.get(name)
+        return given.union(free) if given else free
+
+    def _find_oncoming(
+        self, name: str, turn: _Turn, *, waits: bool
+    ) -> Iterator[tuple[str, tuple[float, float], tuple[float, float]]]:
+        """Who comes, with its seconds and those of who turns to where paths cross, and past it."""
+        times: dict[_Crossing, tuple[float, float]] = {}
+        on_lane, position_of = self._on_lane, self._position_of
+        for source, paths in turn.approaches:
+            for other in on_lane(source):
+                for crossing, to_line, inside in paths:
+                    if not inside and self._next_edge(other, crossing.pair[0]) != crossing.pair[1]:
+                        continue
+                    own = times.get(crossing)
+                    if own is None:
+                        own = times[crossing] = self._cross(name, turn, crossing, waits=waits)
+                    yield other, self._passes(other, to_line - position_of(other), crossing), own
+
+    def _steps(self, seconds: float) -> int:
+        """Whole steps, one at least."""
+        return max(1, int(seconds / self._step_length + 1e-6))
+
+    def _cross(
+        self, name: str, turn: _Turn, crossing: _Crossing, *, waits: bool
+    ) -> tuple[float, float]:
+        """Seconds to when who turns gets to where paths cross, and to when it has left, at least.
+
+        The margin is in the second of one who waits.
+        """
+        length, gains, factor = self._body_of(name)
+        front = self._position_of(name) - (turn.length if waits else 0.0)
+        speed, limit = self._speed_of(name), turn.speed * factor
+        return (
+            _seconds(crossing.here - crossing.half - front, speed, gains, limit),
+            _seconds(crossing.here + crossing.half + length - front, speed, gains, limit)
+            + (MARGIN if waits else 0.0),
+        )
+
+    def _next_edge(self, name: str, edge: str) -> str | None:
+        """The edge that a vehicle takes after one that is near."""
+        route = self._route_named(name)
+        if route.after is not None:
+            return route.after.get(edge)
+        edges, begin = self._route_of(name), max(0, self._index_of(name))
+        pairs = pairwise(edges[begin : begin + _EDGES])
+        return next((after for before, after in pairs if before == edge), None)
+
+    def _passes(self, name: str, to_line: float, crossing: _Crossing) -> tuple[float, float]:
+        """Seconds to when a vehicle is where paths cross, at least, and to when it is past."""
         length, gains, factor = self._body_of(name)
         speed, inside = self._speed_of(name), crossing.inside * factor
         first = crossing.there - crossing.half
         if to_line > 0.0:
             limit = max(self._allowed_of(name), speed)
-            begins = _seconds(to_line, speed, gains, limit)
-            begins += first / max(inside, 0.1)
-        else:
-            begins = _seconds(first + to_line, speed, gains, max(inside, speed))
+            return _seconds(to_line, speed, gains, limit) + first / max(inside, 0.1), math.inf
+        begins = _seconds(first + to_line, speed, gains, max(inside, speed))
         behind = crossing.there + crossing.half + length + to_line
-        if to_line > 0.0 or (speed < _STANDING and behind > 0.0):
+        if speed < _STANDING and behind > 0.0:  # it is not sure that it goes on
             return begins, math.inf
         return begins, max(0.0, behind) / max(speed, 0.1)
 
     # ------------------------------------------------------------------------ the network
 
     @cached_property
-    def _turns(self) -> dict[str, list[_Turn]]:
-        """Turns that others cross who come towards them, by the lanes before and behind the place.
-
-        Where no vehicle waits for others of its own accord (it has priority, has to stop, or goes
-        in turn) there is none.
-        """
-        lane = self._sumo.lane
-        links = {name: lane.getLinks(name) for name in lane.getIDList()}
+    def _before(self) -> dict[str, list[str]]:
+        """Lanes that lead to a lane."""
         before: dict[str, list[str]] = defaultdict(list)
-        entries: list[tuple[str, str, str]] = []
-        obeying = set[str]()
-        for name, own in links.items():
-            for link in own:
+        for name, links in self._lanes.links_of.items():
+            for link in links:
+                before[link[4] or link[0]].append(name)
+        return before
+
+    @cached_property
+    def _entries(self) -> dict[str, list[tuple[str, str, str]]]:
+        """Connections into junctions, by junction: lanes before, behind, and the first inside."""
+        entries: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
+        for name, links in self._lanes.links_of.items():
+            if name not in self._lanes.internal:
+                inside = [(name, link[0], link[4]) for link in links if link[4]]
+                if inside:
+                    entries[self._junction_behind(name)] += inside
+        return entries
+
+    def _junction_behind(self, lane: str) -> str:
+        return str(self._sumo.edge.getToJunction(self._sumo.lane.getEdgeID(lane)))
+
+    @cached_property
+    def _lights(self) -> dict[str, tuple[str, int]]:
+        """The traffic light and its link that lead to a lane inside a junction."""
+        lights = self._sumo.trafficlight
+        return {
+            via: (light, index)
+            for light in lights.getIDList()
+            for index, links in enumerate(lights.getControlledLinks(light))
+            for _, _, via in links
+        }
+
+    def _shortest(self, edge: str) -> tuple[float, float]:
+        """Length of the shortest lane of an edge, m, and the highest limit on it, m/s."""
+        known = self._edges.get(edge)
+        if known is None:
+            lane, own = self._sumo.lane, self._lanes.of_edge[edge]
+            known = min(map(lane.getLength, own)), max(0.1, *map(lane.getMaxSpeed, own))
+            self._edges[edge] = known
+        return known
+
+    def _find_turns(self, pair: _Pair) -> dict[str, _Turn | None]:
+        """Turns from an edge to another that those cross who come towards them.
+
+        By the lanes before and behind the place where one waits; the other lanes before the
+        junction have none. Empty if there is no such turn. Where no vehicle waits for others of its
+        own accord (it has priority, has to stop, or goes in turn) there is none.
+        """
+        lane, links_of = self._sumo.lane, self._lanes.links_of
+        own = self._lanes.of_edge[pair[0]]
+        found: dict[str, _Turn] = {}
+        for source in own:
+            for link in links_of[source]:
                 onto, via = link[0], link[4]
-                before[via or onto].append(name)
-                if via and name not in self._lanes.internal:
-                    entries.append((name, onto, via))
-                    if link[5] in _OBEYING:
-                        obeying.add(via)
-        by_junction: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
-
-        def ends_at(source: str) -> str:
-            return str(self._sumo.edge.getToJunction(lane.getEdgeID(source)))
-
-        for entry in entries:
-            by_junction[ends_at(entry[0])].append(entry)
-        found: dict[str, list[_Turn]] = defaultdict(list)
-        for source, onto, via in entries:
-            inner = next((link[4] for link in links[via] if link[4]), "")
-            waiting, beyond = (via, inner) if inner else (source, via)
-            if via in obeying:
-                continue
-            first = set(lane.getFoes(source, onto))
-            crossings = []
-            for other, other_onto, other_via in by_junction[ends_at(source)]:
-                if other not in first or lane.getEdgeID(other_onto) == lane.getEdgeID(onto):
+                if not via or link[5] in _OBEYING or lane.getEdgeID(onto) != pair[1]:
                     continue
-                crossing = self._find_crossing(
-                    source, beyond, (other, other_onto, other_via), links, before
-                )
-                if crossing is not None:
-                    crossings.append(crossing)
-            if crossings:
-                turn = _Turn(
-                    waiting,
-                    lane.getLength(waiting),
-                    lane.getMaxSpeed(beyond),
-                    lane.getEdgeID(onto),
-                    tuple(crossings),
-                    tuple(dict.fromkeys(name for one in crossings for name, _ in one.lanes)),
-                )
-                found[waiting].append(turn)
-                found[beyond].append(turn)
-        return dict(found)
+                inner = next((link[4] for link in links_of[via] if link[4]), "")
+                waiting, beyond = (via, inner) if inner else (source, via)
+                approaches = self._find_approaches(source, onto, beyond)
+                if approaches:
+                    turn = _Turn(
+                        waiting,
+                        lane.getLength(waiting),
+                        lane.getMaxSpeed(beyond),
+                        *self._lights.get(via, ("", 0)),
+                        approaches,
+                    )
+                    found |= {waiting: turn, beyond: turn}
+        return {**dict.fromkeys(own), **found} if found else {}
 
-    def _find_crossing(
-        self,
-        source: str,
-        beyond: str,
-        other: tuple[str, str, str],
-        links: dict[str, Any],
-        before: dict[str, list[str]],
-    ) -> _Crossing | None:
-        """Where another path crosses the lane behind a waiting place; ``None`` if nowhere."""
+    def _find_approaches(
+        self, source: str, onto: str, beyond: str
+    ) -> tuple[tuple[str, tuple[tuple[_Crossing, float, bool], ...]], ...]:
+        """Lanes on which those come who cross a turn, as :class:`_Turn` has them."""
         lane = self._sumo.lane
-        shape = lane.getShape
-        their, onto, via = other
-        if _turned(shape(source)[-2:], shape(their)[-2:]) < _OPPOSING:
-            return None
-        parts = [via, *(link[4] for link in links[via] if link[4])]
-        path = [*shape(parts[0]), *(point for part in parts[1:] for point in shape(part)[1:])]
-        meets = _find_meeting(shape(beyond), path)
-        if meets is None:
-            return None
-        here, there, angle = meets
-        angle = max(min(angle, math.pi - angle), _FLATTEST)
-        half = 0.5 * _WIDTH * (1.0 / math.sin(angle) + 1.0 / math.tan(angle))
-        lanes, to_line = [], 0.0
-        for part in parts:
-            lanes.append((part, to_line))
-            to_line -= lane.getLength(part)
-        lanes += self._upstream(their, before)
-        return _Crossing(
-            lane.getEdgeID(their), lane.getEdgeID(onto), tuple(lanes), here, there, half,
-            lane.getMaxSpeed(via),
-        )  # fmt: skip
+        shape, edge_of, links_of = lane.getShape, lane.getEdgeID, self._lanes.links_of
+        first, own = set(lane.getFoes(source, onto)), np.array(shape(beyond))
+        found: dict[str, list[tuple[_Crossing, float, bool]]] = defaultdict(list)
+        for other, other_onto, via in self._entries[self._junction_behind(source)]:
+            if other not in first or edge_of(other_onto) == edge_of(onto):
+                continue
+            if _turned(shape(source)[-2:], shape(other)[-2:]) < _OPPOSING:
+                continue
+            parts = [via, *(link[4] for link in links_of[via] if link[4])]
+            path = [*shape(parts[0]), *(point for part in parts[1:] for point in shape(part)[1:])]
+            meets = _find_meeting(own, np.array(path))
+            if meets is None:
+                continue
+            here, there, angle = meets
+            angle = max(min(angle, math.pi - angle), _FLATTEST)
+            half = 0.5 * _WIDTH * (1.0 / math.sin(angle) + 1.0 / math.tan(angle))
+            pair = edge_of(other), edge_of(other_onto)
+            crossing = _Crossing(pair, here, there, half, lane.getMaxSpeed(via))
+            to_line = 0.0
+            for part in parts:
+                found[part].append((crossing, to_line, True))
+                to_line -= lane.getLength(part)
+            for name, rest in self._upstream(other):
+                found[name].append((crossing, rest, False))
+        return tuple((name, tuple(paths)) for name, paths in found.items())
 
-    def _upstream(self, last: str, before: dict[str, list[str]]) -> list[tuple[str, float]]:
+    def _upstream(self, last: str) -> list[tuple[str, float]]:
         """Lanes that lead to a stop line, with the metres from their begin to it."""
         found, ahead, known = [], [(last, 0.0)], {last}
         while ahead:
@@ -366,9 +551,9 @@ class TurningGaps:
             to_line = rest + self._sumo.lane.getLength(name)
             found.append((name, to_line))
             if to_line < _SIGHT:
-                more = [one for one in before[name] if one not in known]
+                more = [lane for lane in self._before[name] if lane not in known]
                 known.update(more)
-                ahead += [(one, to_line) for one in more]
+                ahead += [(lane, to_line) for lane in more]
         return found
 
 
@@ -383,30 +568,34 @@ def _seconds(metres: float, speed: float, gains: float, limit: float) -> float:
     return (limit - speed) / gains + (metres - gaining) / limit
 
 
-def _turned(one: Sequence[_Point], other: Sequence[_Point]) -> float:
+def _turned(step: Sequence[_Point], other: Sequence[_Point]) -> float:
     """Angle between two steps, 0 to pi."""
-    (ax, ay), (bx, by) = ((end[0] - start[0], end[1] - start[1]) for start, end in (one, other))
+    (ax, ay), (bx, by) = ((end[0] - start[0], end[1] - start[1]) for start, end in (step, other))
     return abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
-def _find_meeting(
-    one: Sequence[_Point], other: Sequence[_Point]
-) -> tuple[float, float, float] | None:
-    """Metres along two paths to where they first cross, and the angle there; ``None``: nowhere."""
-    along = 0.0
-    for start, end in pairwise(one):
-        dx, dy = end[0] - start[0], end[1] - start[1]
-        length, beside = math.hypot(dx, dy), 0.0
-        for their_start, their_end in pairwise(other):
-            ex, ey = their_end[0] - their_start[0], their_end[1] - their_start[1]
-            theirs = math.hypot(ex, ey)
-            across = dx * ey - dy * ex
-            if across:
-                px, py = their_start[0] - start[0], their_start[1] - start[1]
-                share, their_share = (px * ey - py * ex) / across, (px * dy - py * dx) / across
-                if 0.0 <= share <= 1.0 and 0.0 <= their_share <= 1.0:
-                    angle = _turned((start, end), (their_start, their_end))
-                    return along + share * length, beside + their_share * theirs, angle
-            beside += theirs
-        along += length
-    return None
+def _find_meeting(path: FloatArray, other: FloatArray) -> tuple[float, float, float] | None:
+    """Metres along two paths to where they first cross, and the angle there; ``None``: nowhere.
+
+    Paths have shape (points, 2), m.
+    """
+    steps, others = np.diff(path, axis=0)[:, None], np.diff(other, axis=0)[None]
+    apart = other[None, :-1] - path[:-1, None]
+    across = _cross_product(steps, others)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = _cross_product(apart, others) / across
+        their_share = _cross_product(apart, steps) / across
+    meet = (share >= 0.0) & (share <= 1.0) & (their_share >= 0.0) & (their_share <= 1.0)
+    if not meet.any():
+        return None
+    row, column = np.unravel_index(np.argmax(meet), meet.shape)
+    lengths, their_lengths = np.hypot(*steps[:, 0].T), np.hypot(*others[0].T)
+    along = lengths[:row].sum() + share[row, column] * lengths[row]
+    theirs = their_lengths[:column].sum() + their_share[row, column] * their_lengths[column]
+    dot = float(steps[row, 0] @ others[0, column])
+    return float(along), float(theirs), math.atan2(abs(float(across[row, column])), dot)
+
+
+def _cross_product(vectors: FloatArray, others: FloatArray) -> FloatArray:
+    result: FloatArray = vectors[..., 0] * others[..., 1] - vectors[..., 1] * others[..., 0]
+    return result
