@@ -27,6 +27,9 @@ const EditorView = lazy(async () => ({ default: (await import("./editor/EditorVi
 const ImportView = lazy(async () => ({ default: (await import("./exchange/ImportView")).ImportView }));
 const MendView = lazy(async () => ({ default: (await import("./mending/MendView")).MendView }));
 const RunView = lazy(async () => ({ default: (await import("./run/RunView")).RunView }));
+const RecordingView = lazy(async () => ({
+  default: (await import("./recordings/RecordingView")).RecordingView,
+}));
 const SweepsView = lazy(async () => ({ default: (await import("./experiments/SweepsView")).SweepsView }));
 const SweepView = lazy(async () => ({ default: (await import("./experiments/SweepView")).SweepView }));
 const StudiesView = lazy(async () => ({ default: (await import("./experiments/StudiesView")).StudiesView }));
@@ -92,6 +95,12 @@ export function App() {
             <>
               <span aria-hidden="true">›</span>
               <span aria-current="page">{address.map}</span>
+            </>
+          )}
+          {address.view === "recording" && (
+            <>
+              <span aria-hidden="true">›</span>
+              <span aria-current="page">{address.recording}</span>
             </>
           )}
           {address.view === "run" && (
@@ -169,6 +178,9 @@ export function App() {
           {address.view === "catalogue" && <CatalogueView />}
           {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}
           {address.view === "imported" && <ImportView key={address.scenario} scenario={address.scenario} />}
+          {address.view === "recording" && (
+            <RecordingView key={address.recording} recording={address.recording} />
+          )}
           {address.view === "mend" && <MendView key={address.map} map={address.map} />}
           {address.view === "run" && (
             <RunView key={address.run} scenario={address.scenario} run={address.run} />

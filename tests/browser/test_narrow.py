@@ -29,7 +29,7 @@ STEPS = (
     "Criteria",
     "Run",
 )
-_RULES = """async () => (await axe.run({resultTypes: ['violations']})).violations
+AXE_RULES = """async () => (await axe.run({resultTypes: ['violations']})).violations
     .flatMap(rule => rule.nodes.map(node => `${rule.id}: ${node.html.slice(0, 120)}`))"""
 
 
@@ -47,7 +47,7 @@ def wrong(user: OdscenPage, view: str) -> list[str]:
         user.page.set_viewport_size({"width": width, "height": height})
         settle(user.page)
         user.page.evaluate(AXE.read_text(encoding="utf-8"))
-        found += [f"{view} {size}: {one}" for one in user.page.evaluate(_RULES)]
+        found += [f"{view} {size}: {one}" for one in user.page.evaluate(AXE_RULES)]
         found += [f"{view} {size}: cut off {one}" for one in clipped_texts(user.page)]
     user.page.set_viewport_size({"width": 1360, "height": 850})
     return found

@@ -753,6 +753,72 @@ export interface paths {
          */
         get: operations["export_scenario_api_scenarios__name__export_get"];
     };
+    "/api/recordings": {
+        /**
+         * List Recordings
+         * @description All recordings, those that came last first.
+         */
+        get: operations["list_recordings_api_recordings_get"];
+        /**
+         * Add Sent Recording
+         * @description Keep a recording, in the background; the result is its name.
+         */
+        post: operations["add_sent_recording_api_recordings_post"];
+    };
+    "/api/recordings/{name}": {
+        /**
+         * Show Recording
+         * @description What a recording has: road users, scenes, and how well it lies on its map.
+         */
+        get: operations["show_recording_api_recordings__name__get"];
+        /**
+         * Delete Recording
+         * @description Delete a recording; scenarios that were made of it stay.
+         */
+        delete: operations["delete_recording_api_recordings__name__delete"];
+    };
+    "/api/recordings/{name}/maps": {
+        /**
+         * List Fitting Maps
+         * @description Maps on whose lanes the vehicles of a recording are, the best first.
+         */
+        get: operations["list_fitting_maps_api_recordings__name__maps_get"];
+    };
+    "/api/recordings/{name}/map": {
+        /**
+         * Set Recording Map
+         * @description Place a recording on a map, in the background.
+         */
+        post: operations["set_recording_map_api_recordings__name__map_post"];
+    };
+    "/api/recordings/{name}/picture": {
+        /**
+         * Recording Picture
+         * @description Map and tracks, with places that are on no lane circled.
+         */
+        get: operations["recording_picture_api_recordings__name__picture_get"];
+    };
+    "/api/recordings/{name}/moments": {
+        /**
+         * Recording Moments
+         * @description Who was where, in binary; see ``docs/server.md``. Fewer moments if there are too many.
+         */
+        get: operations["recording_moments_api_recordings__name__moments_get"];
+    };
+    "/api/recordings/{name}/scenarios": {
+        /**
+         * Make Scenario
+         * @description Make a scenario of a part of a recording, in the background; the result is its name.
+         */
+        post: operations["make_scenario_api_recordings__name__scenarios_post"];
+    };
+    "/api/scenarios/{name}/ghosts": {
+        /**
+         * Scenario Ghosts
+         * @description Tracks of the recording that a scenario was made of; none of others.
+         */
+        get: operations["scenario_ghosts_api_scenarios__name__ghosts_get"];
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -1159,6 +1225,11 @@ export interface components {
             importer?: string | null;
             /** @description Of the importer, a JSON object. */
             options?: string | null;
+        };
+        Body_add_sent_recording_api_recordings_post: {
+            /** @description A recording, the files that belong to it, and if need be its map. */
+            files: string[];
+            map?: string | null;
         };
         Body_import_files_api_imports__of__post: {
             /** @description A scenario, and if need be its map (.xodr) and catalogs. */
@@ -2144,6 +2215,11 @@ export interface components {
             x: number | null;
             y: number | null;
         };
+        /** @description A map, and the share of states of moving vehicles on its lanes, in their direction. */
+        FittingMapInfo: {
+            map: string;
+            on_lane: number;
+        };
         /**
          * @description A flow of actors from one spawn node, ``per_hour`` of them from ``begin`` to ``end``.
          *
@@ -2225,6 +2301,18 @@ export interface components {
             rate: number;
             /** @default false */
             once: boolean;
+        };
+        /** @description The track of a road user under a scenario; seconds of the run, metres, radians. */
+        Ghost: {
+            id: string;
+            actor: string | null;
+            category: components["schemas"]["Category"] | null;
+            length: number;
+            width: number;
+            time: number[];
+            x: number[];
+            y: number[];
+            hdg: number[];
         };
         /** @description Go on with an interrupted run; ``speed`` as in :class:`NewRun`. */
         GoOn: {
@@ -2678,6 +2766,14 @@ export interface components {
             site: string;
             ground: string;
             legend: components["schemas"]["PictureKey"][];
+        };
+        /** @description How well states lie on lanes: shares, and metres left of their middles. */
+        MapAgreement: {
+            states: number;
+            on_lane: number;
+            wrong_way: number;
+            offset_median: number | null;
+            offset_95: number | null;
         };
         /** @description The same with what the map means, and its traffic lights. */
         MapDetails: {
@@ -3328,6 +3424,103 @@ export interface components {
             ];
             /** @default 1 */
             within: number;
+        };
+        /** @description A scene that meets a criterion; ``value`` is the worst, see ``docs/recordings.md``. */
+        RecordedScene: {
+            /** @enum {string} */
+            kind: "hard_braking" | "short_ttc" | "lane_change" | "cut_in" | "crossing_pedestrian";
+            id: string;
+            other: string | null;
+            begin: number;
+            end: number;
+            x: number;
+            y: number;
+            value: number;
+        };
+        /** @description A road user; seconds and metres. Its row is its number in moments. */
+        RecordedUser: {
+            id: string;
+            category: components["schemas"]["Category"];
+            kind: string | null;
+            begin: number;
+            end: number;
+            length: number;
+            width: number;
+        };
+        /**
+         * @description All that is known of a recording but the places of road users.
+         *
+         *     ``published_schema`` is that of its file; ``offset`` metres and degrees to the frame of the map;
+         *     ``added`` maps that came with it; ``unused`` files that were sent with it and not needed.
+         *     ``origin`` is added to places of moments, ``bounds`` are those of the tracks, metres.
+         */
+        RecordingInfo: {
+            name: string;
+            file: string;
+            road_users: number;
+            begin: number;
+            end: number;
+            map: string | null;
+            published_schema: string;
+            step: number;
+            notes: string[];
+            added: string[];
+            unused: string[];
+            offset: [
+                number,
+                number,
+                number
+            ];
+            origin: [
+                number,
+                number
+            ];
+            bounds: [
+                number,
+                number,
+                number,
+                number
+            ];
+            vehicles: components["schemas"]["MapAgreement"] | null;
+            pedestrians: components["schemas"]["MapAgreement"] | null;
+            hours: number;
+            vehicle_km: number;
+            frequencies: components["schemas"]["SceneFrequency"][];
+            users: components["schemas"]["RecordedUser"][];
+            scenes: components["schemas"]["RecordedScene"][];
+        };
+        /** @description A part of a recording that a scenario is made of; ``ego`` may be empty. */
+        RecordingPart: {
+            begin: number;
+            end: number;
+            /** @default  */
+            ego?: string;
+            /**
+             * @default track
+             * @enum {string}
+             */
+            follow?: "track" | "react" | "drive";
+        };
+        /**
+         * @description The map that a recording is of, and metres and degrees to its frame, ``X,Y[,DEGREES]``.
+         *
+         *     With ``estimate`` it is moved onto the lanes from there.
+         */
+        RecordingPlace: {
+            map: string;
+            /** @default  */
+            offset?: string;
+            /** @default false */
+            estimate?: boolean;
+        };
+        /** @description A recording, for a list; seconds as it counts them. */
+        RecordingRow: {
+            name: string;
+            file: string;
+            road_users: number;
+            begin: number;
+            end: number;
+            map: string | null;
         };
         /** @description The actor is driven as if there had been no rule: by whom its ``driver`` names. */
         Releasing: Record<string, never>;
@@ -4043,6 +4236,14 @@ export interface components {
             label: string;
             undo: string | null;
             redo: string | null;
+        };
+        /** @description How often scenes of a kind are. */
+        SceneFrequency: {
+            /** @enum {string} */
+            kind: "hard_braking" | "short_ttc" | "lane_change" | "cut_in" | "crossing_pedestrian";
+            count: number;
+            per_hour: number | null;
+            per_100_km: number | null;
         };
         /**
          * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
@@ -7570,6 +7771,177 @@ export interface operations {
             200: {
                 content: {
                     "application/zip": string;
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    list_recordings_api_recordings_get: {
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["RecordingRow"][];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    add_sent_recording_api_recordings_post: {
+        requestBody: {
+            content: {
+                "multipart/form-data": FormData;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                content: {
+                    "application/json": components["schemas"]["JobStarted"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    show_recording_api_recordings__name__get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["RecordingInfo"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    delete_recording_api_recordings__name__delete: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["RecordingRow"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    list_fitting_maps_api_recordings__name__maps_get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["FittingMapInfo"][];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    set_recording_map_api_recordings__name__map_post: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RecordingPlace"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                content: {
+                    "application/json": components["schemas"]["JobStarted"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    recording_picture_api_recordings__name__picture_get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "image/svg+xml": string;
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    recording_moments_api_recordings__name__moments_get: {
+        parameters: {
+            query?: {
+                begin?: number;
+                end?: number;
+                /** @description Rows at most. */
+                most?: number;
+            };
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/octet-stream": string;
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    make_scenario_api_recordings__name__scenarios_post: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RecordingPart"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                content: {
+                    "application/json": components["schemas"]["JobStarted"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    scenario_ghosts_api_scenarios__name__ghosts_get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["Ghost"][];
                 };
             };
             default: components["responses"]["Error"];

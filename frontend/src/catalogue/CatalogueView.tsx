@@ -7,7 +7,7 @@ import { api } from "../api/client";
 import { removal } from "../api/removal";
 import type { MapInfo } from "../api/types";
 import { formatOf } from "../exchange/formats";
-import { isXosc, useImport } from "../exchange/useImport";
+import { isXosc, RECORDED, useImport } from "../exchange/useImport";
 import { forgetMaps } from "../map/loaded";
 import { IconSearch, IconTrash } from "../ui/icons";
 import { tell, tellError } from "../ui/notices";
@@ -19,9 +19,21 @@ import { BrokenMaps } from "./BrokenMaps";
 import { Conversion } from "./Conversion";
 import { MapCard } from "./MapCard";
 import { arranged, type Order, ORDERS, type Wish, WISHES } from "./order";
+import { Recordings } from "./Recordings";
 import { Scenarios } from "./Scenarios";
 import { Templates } from "./Templates";
 import { Wastebasket } from "./Wastebasket";
+
+/** A scenario of CommonRoad has road users that move; its other files are maps. */
+const hasObstacles = async (file: File): Promise<boolean> =>
+  /\.xml$/i.test(file.name) && (await file.text()).includes("<dynamicObstacle");
+
+async function formatOfDropped(files: readonly File[]): Promise<string | null> {
+  const of = await formatOf(files);
+  if (of !== null) return of;
+  const moving = await Promise.all(files.map(hasObstacles));
+  return moving.includes(true) ? RECORDED : null;
+}
 
 /** The first screen: choose a map, or open a scenario. */
 export function CatalogueView() {
@@ -60,7 +72,7 @@ export function CatalogueView() {
     const files = [...event.dataTransfer.files];
     if (files.some(isXosc)) importing.begin(files);
     else if (files.length > 0)
-      formatOf(files).then((of) => {
+      formatOfDropped(files).then((of) => {
         if (of !== null) importing.begin(files, of);
         else tell(t`Maps (.xodr) go onto “Add a map of your own”, below the maps.`);
       }, tellError);
@@ -191,6 +203,7 @@ export function CatalogueView() {
       )}
       <Templates maps={all} />
       {own.length === 0 && mine}
+      <Recordings />
       <Button
         mt="xl"
         variant="subtle"

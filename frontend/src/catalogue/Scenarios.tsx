@@ -16,8 +16,8 @@ import { useState } from "react";
 
 import { api } from "../api/client";
 import type { ScenarioEntry } from "../api/types";
-import { ImportWork, XOSC_FILES } from "../exchange/ImportWork";
-import type { Import } from "../exchange/useImport";
+import { ImportWork, RECORDED_FILES, XOSC_FILES } from "../exchange/ImportWork";
+import { type Import, RECORDED } from "../exchange/useImport";
 import { IconTrash } from "../ui/icons";
 import { tellError } from "../ui/notices";
 import { go, hashOf } from "../ui/address";
@@ -73,6 +73,13 @@ export function Scenarios({
             {(props) => (
               <Button variant="default" size="sm" disabled={importing.state?.refusal === null} {...props}>
                 <Trans>Import OpenSCENARIO</Trans>
+              </Button>
+            )}
+          </FileButton>
+          <FileButton multiple accept={RECORDED_FILES} onChange={(files) => importing.begin(files, RECORDED)}>
+            {(props) => (
+              <Button variant="default" size="sm" disabled={importing.state?.refusal === null} {...props}>
+                <Trans>Open a recording</Trans>
               </Button>
             )}
           </FileButton>

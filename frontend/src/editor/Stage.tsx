@@ -12,6 +12,7 @@ import { Legend } from "./Legend";
 import { RoadUserTable } from "./RoadUserTable";
 import { TimeDock } from "../time/TimeDock";
 import { usePlannedView, withoutStarts } from "../time/usePlannedView";
+import { useGhosts } from "../recordings/useGhosts";
 import { useSlow } from "../ui/useSlow";
 import type { EditorNow } from "./useEditing";
 import { useScene } from "./useScene";
@@ -43,7 +44,11 @@ export function Stage({
   const [open, setOpen] = useState(true);
   const view = usePlannedView(now, dock === "time" && open);
   const starts = useScene(now);
-  const scene = useMemo(() => (view.shown ? withoutStarts(starts) : starts), [starts, view.shown]);
+  const ghosts = useGhosts(now.scenario.name, view.shown ? view.moment : null);
+  const scene = useMemo(
+    () => ({ ...(view.shown ? withoutStarts(starts) : starts), ghosts }),
+    [starts, view.shown, ghosts],
+  );
   const hint = view.shown ? view.hint : now.unreachable ? NO_ROUTE() : (carried?.hint ?? handler.hint(hover));
   const head = useMemo(
     () => (

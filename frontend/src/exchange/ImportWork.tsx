@@ -2,14 +2,16 @@ import { Alert, Button, FileButton, Group, Loader, Text } from "@mantine/core";
 
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import type { Import } from "./useImport";
+import { type Import, RECORDED } from "./useImport";
 
 export const XOSC_FILES = ".xosc,.xodr";
+/** Recordings, and the maps that come with them. */
+export const RECORDED_FILES = ".csv,.parquet,.osi,.mcap,.xml,.xodr,.osm";
 
 /** Scrolls to what has just been shown. */
 const intoSight = (shown: HTMLElement | null): void => shown?.scrollIntoView({ block: "nearest" });
 
-/** An import of OpenSCENARIO that is running, or why it was refused. */
+/** An import of OpenSCENARIO or a recording that is running, or why it was refused. */
 export function ImportWork({ work: { state, begin, cancel, close } }: { work: Import }) {
   if (!state) return null;
   const names = state.files.map(({ name }) => name).join(", ");
@@ -40,10 +42,16 @@ export function ImportWork({ work: { state, begin, cancel, close } }: { work: Im
       <Text size="sm" mb="sm">
         {state.refusal}
       </Text>
-      <FileButton multiple accept={XOSC_FILES} onChange={(more) => begin(together(state.files, more))}>
+      <FileButton
+        multiple
+        accept={state.of === RECORDED ? RECORDED_FILES : XOSC_FILES}
+        onChange={(more) => begin(together(state.files, more), state.of)}
+      >
         {(props) => (
           <Button size="compact-sm" variant="default" {...props}>
-            <Trans>Add its map or catalogs and try again</Trans>
+            {state.of === RECORDED
+              ? t`Add the files that belong to it and try again`
+              : t`Add its map or catalogs and try again`}
           </Button>
         )}
       </FileButton>

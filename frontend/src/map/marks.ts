@@ -14,7 +14,7 @@ import {
   VEHICLE_NODE,
 } from "./colors";
 import type { Graph, Place } from "./graph";
-import type { Scene, SceneActor, SceneFlow, ScenePin } from "./scene";
+import type { Scene, SceneActor, SceneFlow, SceneGhost, ScenePin } from "./scene";
 import type { View } from "./view";
 import type { Category } from "../api/types";
 
@@ -71,6 +71,46 @@ export function drawRoute(context: CanvasRenderingContext2D, view: View, scene: 
 }
 
 /** Lines of rules: with a dot at each point and an arrow head where they end. */
+/** Recorded tracks as thin dotted lines, and bodies as dashed outlines. */
+export function drawGhosts(
+  context: CanvasRenderingContext2D,
+  view: View,
+  ghosts: readonly SceneGhost[],
+  palette: Palette,
+): void {
+  const px = 1 / view.scale;
+  context.strokeStyle = palette.ink;
+  context.lineWidth = 1.2 * px;
+  context.globalAlpha = 0.5;
+  context.setLineDash([2 * px, 3 * px]);
+  context.beginPath();
+  for (const { points } of ghosts)
+    points.forEach(([x, y], n) => (n ? context.lineTo(x, y) : context.moveTo(x, y)));
+  context.stroke();
+  context.globalAlpha = 0.85;
+  context.setLineDash([3 * px, 2 * px]);
+  context.beginPath();
+  for (const { body } of ghosts) {
+    if (!body) continue;
+    const [c, s] = [Math.cos(body.hdg), Math.sin(body.hdg)];
+    const [a, b] = [body.length / 2, body.width / 2];
+    [
+      [a, b],
+      [-a, b],
+      [-a, -b],
+      [a, -b],
+      [a, b],
+    ].forEach(([u = 0, v = 0], n) => {
+      const [x, y] = [body.x + u * c - v * s, body.y + u * s + v * c];
+      if (n) context.lineTo(x, y);
+      else context.moveTo(x, y);
+    });
+  }
+  context.stroke();
+  context.setLineDash([]);
+  context.globalAlpha = 1;
+}
+
 export function drawLines(context: CanvasRenderingContext2D, view: View, { lines }: Scene): void {
   context.lineCap = context.lineJoin = "round";
   for (const { points, strong, arrow } of lines) {

@@ -50,6 +50,12 @@ export interface SceneLine {
   arrow: boolean;
 }
 
+/** A recorded track under a scenario, and its body at a moment; null while it is not there. */
+export interface SceneGhost {
+  points: readonly (readonly [number, number])[];
+  body: { x: number; y: number; hdg: number; length: number; width: number } | null;
+}
+
 /** A detector of the traffic light that is looked at. */
 export interface SceneDetector {
   /** Points along it in driving direction, or where people wait. */
@@ -74,6 +80,8 @@ export interface Scene {
   laneColors?: LaneColors | null;
   pins: readonly ScenePin[];
   lines: readonly SceneLine[];
+  /** Tracks of a recording that it was made of, below all else. */
+  ghosts?: readonly SceneGhost[];
   detectors: readonly SceneDetector[];
   hoverSegment: number | null;
   /** Which places are shown when near. */

@@ -29,6 +29,7 @@ import {
   drawFlow,
   drawGoal,
   drawLane,
+  drawGhosts,
   drawLines,
   drawOffset,
   drawPin,
@@ -110,6 +111,7 @@ export class SceneLayer {
       this.drawGraph(context, view, size, scene, palette);
     }
     drawRoute(context, view, scene);
+    if (scene.ghosts) drawGhosts(context, view, scene.ghosts, palette);
     drawLines(context, view, scene);
     drawDetectors(context, view, scene.detectors);
     if (scene.hover && this.graph) drawLane(context, this.graph, scene.hover);

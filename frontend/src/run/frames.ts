@@ -53,6 +53,19 @@ function floats(data: ArrayBuffer): Float32Array {
   return Float32Array.from({ length: data.byteLength / 4 }, (_, i) => view.getFloat32(4 * i, true));
 }
 
+/** The road user within a reach of a place, metres, in a frame that was arranged last. */
+export function nearest(crowd: Crowd, { pose }: Moving, x: number, y: number, reach: number): string | null {
+  let best: string | null = null;
+  let least = reach;
+  for (const { id } of crowd.all()) {
+    const row = crowd.row(id);
+    if (row < 0) continue;
+    const away = Math.hypot(nth(pose, 5 * row) - x, nth(pose, 5 * row + 1) - y);
+    if (away < least) [best, least] = [id, away];
+  }
+  return best;
+}
+
 /** Joins frames with what is known of each road user. */
 export class Crowd {
   private readonly known = new Map<number, Introduced>();

@@ -9,6 +9,10 @@ import { STOPPED } from "./tint";
 
 const ROW = 6;
 
+/** Columns of who was where: lists, or typed arrays of what came in binary. */
+export type MovedColumns = Pick<ReplayColumns, "actors"> &
+  Record<Exclude<keyof ReplayColumns, "actors">, ArrayLike<number>>;
+
 /** A recorded run that can be shown at any time; between two moments places are interpolated. */
 export class Replay {
   readonly crowd = new Crowd();
@@ -22,7 +26,7 @@ export class Replay {
   /** How long each row's road user has been stopped before, seconds. */
   private readonly stopped: Float32Array;
 
-  constructor(private readonly columns: ReplayColumns) {
+  constructor(private readonly columns: MovedColumns) {
     const { times, x, y } = columns;
     this.begin = times[0] ?? 0;
     const last = times.length - 1;
@@ -36,7 +40,7 @@ export class Replay {
   }
 
   /** The recorded moments. */
-  get times(): readonly number[] {
+  get times(): ArrayLike<number> {
     return this.columns.times;
   }
 
@@ -81,9 +85,14 @@ export class Replay {
   extent(): Bounds | null {
     const { actors, x, y } = this.columns;
     if (actors.length === 0 || actors.length > MOST_ACTORS) return null;
-    const least = (of: readonly number[]): number => of.reduce((low, one) => Math.min(low, one), Infinity);
-    const most = (of: readonly number[]): number => of.reduce((high, one) => Math.max(high, one), -Infinity);
-    return [least(x), least(y), most(x), most(y)];
+    const bounds: Bounds = [Infinity, Infinity, -Infinity, -Infinity];
+    for (let row = 0; row < x.length; row++) {
+      bounds[0] = Math.min(bounds[0], nth(x, row));
+      bounds[1] = Math.min(bounds[1], nth(y, row));
+      bounds[2] = Math.max(bounds[2], nth(x, row));
+      bounds[3] = Math.max(bounds[3], nth(y, row));
+    }
+    return bounds;
   }
 
   /** Speeds of a road user at all moments at which it is on the road, with limits where they are known. */
@@ -130,7 +139,7 @@ export function between(a: Pose, b: Pose, span: number, share: number): Pose {
 }
 
 /** Last moment that is not after `time`; the first one before all. */
-export function momentAt(times: readonly number[], time: number): number {
+export function momentAt(times: ArrayLike<number>, time: number): number {
   let [low, high] = [0, times.length - 1];
   while (low < high) {
     const middle = (low + high + 1) >> 1;
@@ -141,7 +150,7 @@ export function momentAt(times: readonly number[], time: number): number {
 }
 
 /** Of each row, for how long its road user was stopped up to then; moments not recorded do not count. */
-function stoppedSoFar({ times, first, speed }: ReplayColumns, next: Int32Array): Float32Array {
+function stoppedSoFar({ times, first, speed }: MovedColumns, next: Int32Array): Float32Array {
   const seconds = new Float32Array(next.length);
   for (let i = 0; i + 1 < times.length; i++) {
     const span = nth(times, i + 1) - nth(times, i);
@@ -154,12 +163,12 @@ function stoppedSoFar({ times, first, speed }: ReplayColumns, next: Int32Array):
 }
 
 /** The last moment at which there are road users; the very last one if there are none at all. */
-function lastBusy({ times, first }: ReplayColumns): number {
+function lastBusy({ times, first }: MovedColumns): number {
   for (let i = times.length - 1; i >= 0; i--) if (nth(first, i + 1) > nth(first, i)) return i;
   return times.length - 1;
 }
 
-function following({ first, actor, actors }: ReplayColumns): Int32Array {
+function following({ first, actor, actors }: MovedColumns): Int32Array {
   const next = new Int32Array(actor.length).fill(-1);
   const last = new Int32Array(actors.length).fill(-1);
   for (let i = 0; i + 1 < first.length; i++) {

@@ -3,7 +3,7 @@ import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } fro
 import { nth } from "../lists";
 import type { MapHandle, Pointed } from "../map/MapCanvas";
 import type { Moving } from "../map/scene";
-import type { Crowd, Frame } from "./frames";
+import { type Crowd, type Frame, nearest } from "./frames";
 import type { LimitOf } from "./limits";
 import type { SpeedPoint } from "./SpeedChart";
 import { StoppedDelay } from "./tint";
@@ -114,15 +114,7 @@ export function usePicture(
   const near = useCallback((at: Pointed): string | null => {
     if (!last.current) return null;
     const { crowd, moving } = last.current;
-    let best: string | null = null;
-    let least = Math.max(at.reach, 3);
-    for (const { id } of crowd.all()) {
-      const row = crowd.row(id);
-      if (row < 0) continue;
-      const away = Math.hypot(nth(moving.pose, 5 * row) - at.x, nth(moving.pose, 5 * row + 1) - at.y);
-      if (away < least) [best, least] = [id, away];
-    }
-    return best;
+    return nearest(crowd, moving, at.x, at.y, Math.max(at.reach, 3));
   }, []);
   const speedsOf = useCallback((id: string) => speeds.current.get(id) ?? [], []);
   const latest = useCallback(() => last.current, []);

@@ -1,32 +1,25 @@
-import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+import { useCallback, useEffect, useMemo, useState } from "react";
 
 import { runs } from "../api/runs";
 import { reasonOf } from "../ui/reason";
 import type { Crowd, Frame } from "./frames";
 import { Replay } from "./replay";
+import { type Playing, usePlaying } from "./usePlaying";
 
-export interface Player {
+export interface Player extends Playing {
   replay: Replay | null;
   loading: boolean;
   /** Why there is nothing to play. */
   error: string | null;
-  time: number;
-  playing: boolean;
-  speed: number;
-  play: () => void;
-  pause: () => void;
-  seek: (time: number) => void;
-  setSpeed: (speed: number) => void;
 }
 
 /** Plays a recorded run; it is fetched when `wanted`. */
 export function useReplay(run: string, wanted: boolean, show: (frame: Frame, crowd: Crowd) => void): Player {
   const [replay, setReplay] = useState<Replay | null>(null);
   const [error, setError] = useState<string | null>(null);
-  const [time, setTime] = useState(0);
-  const [playing, setPlaying] = useState(false);
-  const [speed, setSpeed] = useState(1);
-  const clock = useRef(0);
+  const showAt = useCallback((time: number) => replay && show(replay.at(time), replay.crowd), [replay, show]);
+  const playing = usePlaying(replay, showAt);
+  const { start } = playing;
 
   useEffect(() => {
     if (!wanted) return;
@@ -36,8 +29,7 @@ export function useReplay(run: string, wanted: boolean, show: (frame: Frame, cro
         if (!current) return;
         const made = new Replay(columns);
         setReplay(made);
-        clock.current = made.begin;
-        setTime(made.begin);
+        start(made.begin);
         show(made.at(made.begin), made.crowd);
       },
       (reason: unknown) => {
@@ -47,53 +39,10 @@ export function useReplay(run: string, wanted: boolean, show: (frame: Frame, cro
     return () => {
       current = false;
     };
-  }, [run, wanted, show]);
+  }, [run, wanted, show, start]);
 
-  const seek = useCallback(
-    (to: number) => {
-      if (!replay) return;
-      clock.current = Math.min(replay.end, Math.max(replay.begin, to));
-      setTime(clock.current);
-      show(replay.at(clock.current), replay.crowd);
-    },
-    [replay, show],
-  );
-
-  useEffect(() => {
-    if (!playing || !replay) return;
-    let pending = 0;
-    let before = performance.now();
-    const tick = (wall: number): void => {
-      seek(clock.current + ((wall - before) / 1000) * speed);
-      before = wall;
-      if (clock.current >= replay.end) setPlaying(false);
-      else pending = requestAnimationFrame(tick);
-    };
-    pending = requestAnimationFrame((wall) => {
-      before = wall;
-      tick(wall);
-    });
-    return () => cancelAnimationFrame(pending);
-  }, [playing, replay, speed, seek]);
-
-  const play = useCallback(() => {
-    if (replay && clock.current >= replay.end) seek(replay.begin);
-    setPlaying(true);
-  }, [replay, seek]);
-  const pause = useCallback(() => setPlaying(false), []);
   return useMemo(
-    () => ({
-      replay,
-      loading: wanted && !replay && !error,
-      error,
-      time,
-      playing,
-      speed,
-      play,
-      pause,
-      seek,
-      setSpeed,
-    }),
-    [replay, wanted, error, time, playing, speed, play, pause, seek],
+    () => ({ ...playing, replay, loading: wanted && !replay && !error, error }),
+    [playing, replay, wanted, error],
   );
 }

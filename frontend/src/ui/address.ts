@@ -12,6 +12,7 @@ export type Address =
   | { view: "sweeps"; scenario: string }
   | { view: "sweep"; scenario: string; sweep: string }
   | { view: "mend"; map: string }
+  | { view: "recording"; recording: string }
   | { view: "studies" }
   | { view: "study"; study: string };
 
@@ -24,6 +25,7 @@ export function parseAddress(hash: string): Address {
   if (view === "sweeps" && scenario) return { view: "sweeps", scenario };
   if (view === "sweep" && scenario && run) return { view: "sweep", scenario, sweep: run };
   if (view === "mend" && scenario) return { view, map: scenario };
+  if (view === "recording" && scenario) return { view, recording: scenario };
   if (view === "studies") return { view };
   if (view === "study" && scenario) return { view, study: scenario };
   return { view: "catalogue" };
@@ -39,6 +41,7 @@ export function hashOf(address: Address): string {
   if (address.view === "sweeps") return `#/sweeps/${enc(address.scenario)}`;
   if (address.view === "sweep") return `#/sweep/${enc(address.scenario)}/${enc(address.sweep)}`;
   if (address.view === "mend") return `#/mend/${enc(address.map)}`;
+  if (address.view === "recording") return `#/recording/${enc(address.recording)}`;
   if (address.view === "studies") return "#/studies";
   if (address.view === "study") return `#/study/${enc(address.study)}`;
   return "#/";

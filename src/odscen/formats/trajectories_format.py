@@ -11,7 +11,9 @@ from odscen.base.errors import InputError
 from odscen.formats.base import ElementReport, FileContent, Format, FormatOption
 
 if TYPE_CHECKING:
-    from odscen.formats.base import ImportSource
+    from collections.abc import Sequence
+
+    from odscen.formats.base import GivenFile, ImportSource
 
 FOLLOWS = ("track", "react", "drive")
 """What a road user of a recording does: follows its track; until the ego is close; never."""
@@ -60,6 +62,12 @@ def read_tracks(source: ImportSource) -> FileContent:
     return FileContent(scenario=scenario, lists=report.lists)
 
 
+def _choose_tracks(files: Sequence[GivenFile]) -> int:
+    from odscen.formats.tracks.read_recording import choose_recording
+
+    return choose_recording(files)
+
+
 FORMAT = Format(
     id="trajectories",
     title="Recorded traffic (CSV, Parquet, OSI)",
@@ -68,6 +76,7 @@ FORMAT = Format(
     of=("scenario", "run"),
     suffixes=(".csv", ".parquet", ".osi", ".mcap"),
     read=read_tracks,
+    choose_main=_choose_tracks,
     options=(
         FormatOption("window", "Part of the recording, FROM..TO in s or H:MM:SS."),
         FormatOption("offset", "Metres east and north, and degrees, to the map's frame: X,Y,D."),

@@ -40,6 +40,11 @@ IMPORT_MEMORY_PER_BYTE = 60
 IMPORT_SECONDS = 30.0
 IMPORT_SECONDS_PER_MEGABYTE = 30.0
 """The same for a file of OpenSCENARIO, with the map that it plays on."""
+RECORDING_MEMORY = 1_200_000_000
+RECORDING_MEMORY_PER_BYTE = 12
+RECORDING_SECONDS = 60.0
+RECORDING_SECONDS_PER_MEGABYTE = 5.0
+"""The same for recorded traffic that is read, placed on a map and searched for scenes."""
 TRIAL_MEMORY = 8_000_000_000
 TRIAL_SECONDS = 7200.0
 _FILE_SHARE = 4
@@ -192,6 +197,14 @@ def for_import(size: int) -> Allowance:
     return Allowance(
         min(MOST_MEMORY, IMPORT_MEMORY + IMPORT_MEMORY_PER_BYTE * size),
         IMPORT_SECONDS + IMPORT_SECONDS_PER_MEGABYTE * size / 1e6,
+    )
+
+
+def for_recording(size: int) -> Allowance:
+    """What reading recorded traffic of so many bytes, and placing it on a map, may use."""
+    return Allowance(
+        RECORDING_MEMORY + RECORDING_MEMORY_PER_BYTE * size,
+        RECORDING_SECONDS + RECORDING_SECONDS_PER_MEGABYTE * size / 1e6,
     )
 
 

@@ -146,6 +146,11 @@ class Workspace:
         return self.root / "sweeps"
 
     @property
+    def recordings(self) -> Path:
+        """Folder of recordings that were opened in the page."""
+        return self.root / "recordings"
+
+    @property
     def studies(self) -> Path:
         """Folder of studies that were started in the page."""
         return self.root / "studies"

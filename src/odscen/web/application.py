@@ -22,7 +22,7 @@ from odscen.maps.child_process import keep_ready
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.web.entry_pages import interface_page
 from odscen.web.error_answers import ERROR_RESPONSES, add_error_handlers, error_response
-from odscen.web.exchange import exchange_routes
+from odscen.web.exchange import exchange_routes, recording_routes
 from odscen.web.large.large_documents import LARGE
 from odscen.web.messages import Health
 from odscen.web.routes import (
@@ -150,6 +150,8 @@ def create_app(
     app.include_router(demand_routes.days)
     app.include_router(exchange_routes.router)
     app.include_router(exchange_routes.exports)
+    app.include_router(recording_routes.router)
+    app.include_router(recording_routes.ghosts)
 
     @app.get("/api/docs", include_in_schema=False)
     def describe_interface() -> Response:

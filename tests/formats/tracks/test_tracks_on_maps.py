@@ -43,8 +43,7 @@ def track(name: str, kind: str, time: Any, x: Any, y: Any, size: tuple[float, fl
     )
 
 
-@pytest.fixture(scope="module")
-def crossing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def crossing_traffic() -> pl.DataFrame:
     """A cut-in, hard braking, a short TTC and a pedestrian who crosses, each at a known time."""
     t = np.arange(10.0, 18.0 + 1e-9, STEP)
     u = t - 10.0
@@ -70,8 +69,13 @@ def crossing(tmp_path_factory: pytest.TempPathFactory) -> Path:
             (0.4, 0.4),
         ),
     ]
+    return pl.concat(tracks)
+
+
+@pytest.fixture(scope="module")
+def crossing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("tracks") / "crossing.csv"
-    pl.concat(tracks).write_csv(file)
+    crossing_traffic().write_csv(file)
     return file
 
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError, in_file
 from odscen.formats.tracks.recorded_traffic import shift_tracks
-from odscen.formats.tracks.table_schemas import TimeWindow, read_track_table
+from odscen.formats.tracks.table_schemas import TimeWindow, has_track_columns, read_track_table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.formats.base import GivenFile
     from odscen.formats.tracks.recorded_traffic import RecordedTraffic
@@ -44,6 +44,35 @@ def read_recording(file: GivenFile, options: Mapping[str, str] | None = None) ->
     if offset == (0.0, 0.0, 0.0):
         return recorded
     return replace(recorded, rows=shift_tracks(recorded.rows, *offset))
+
+
+def choose_recording(files: Sequence[GivenFile]) -> int:
+    """Which of several files has the tracks; those that belong to it are found beside it.
+
+    Raises
+    ------
+    InputError
+        If none has, or several recordings are among them.
+    """
+    endings = (".csv", ".parquet", ".osi", ".mcap", ".xml")
+    given = [row for row, file in enumerate(files) if file.name.lower().endswith(endings)]
+    if len(given) == 1:
+        return given[0]
+    found = [row for row in given if is_track_file(files[row])]
+    # Pedestrians of INTERACTION and SinD have a file of their own.
+    main = [row for row in found if not files[row].name.lower().startswith("ped")] or found
+    if len(main) != 1:
+        named = ", ".join(files[row].name for row in main or given)
+        what = f"several recordings were sent ({named})" if main else "none of the files has tracks"
+        raise InputError(f"{what}; send one recording, with the files that belong to it")
+    return main[0]
+
+
+def is_track_file(file: GivenFile) -> bool:
+    """Whether a file has tracks, by its ending or its columns."""
+    if not file.name.lower().endswith((".csv", ".parquet")):
+        return True
+    return has_track_columns(file)
 
 
 def _read_by_ending(

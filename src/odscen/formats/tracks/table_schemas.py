@@ -127,6 +127,13 @@ def read_track_table(
     return replace(recorded, unused=tuple(unused))
 
 
+def has_track_columns(file: GivenFile) -> bool:
+    """Whether a table has the columns of a schema that is known."""
+    columns = set(_columns_of(file))
+    is_ngsim = {name.lower() for name in columns} >= _NGSIM_COLUMNS
+    return is_ngsim or any(schema.needed <= columns for schema in SCHEMAS)
+
+
 def _read_with_schema(given: TrackFile) -> RecordedTraffic:
     if given.options.get("columns"):
         return _read_named_columns(given)

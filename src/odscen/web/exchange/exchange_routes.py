@@ -100,7 +100,7 @@ class FormatInfo(Answer):
 router = APIRouter(prefix="/api")
 exports = APIRouter(prefix="/api/scenarios", route_class=LargeDocumentRoute)
 
-_REPORT, _PLAN = "import.json", "import.sweep.json"
+IMPORT_REPORT, _PLAN = "import.json", "import.sweep.json"
 """Files beside the history of a scenario."""
 
 
@@ -150,7 +150,7 @@ def import_files(
         read = read_sent_scenario(shared.workspace, sent, of=of, options=options, progress=progress)
         draft = shared.drafts.create(read.scenario, None, stem=read.stem, label="Import")
         about = {"file": read.file, "added": read.added, "lists": json.loads(read.report)}
-        shared.drafts.keep(draft.name, _REPORT, json.dumps(about))
+        shared.drafts.keep(draft.name, IMPORT_REPORT, json.dumps(about))
         if read.plan is not None:
             shared.drafts.keep(draft.name, _PLAN, read.plan)
         return JobResult(draft.name)
@@ -163,7 +163,7 @@ def import_files(
 def import_report(name: str, shared: Shared) -> ImportInfo:
     """What became of each element of the file that a scenario was imported from."""
     row = shared.drafts.row(name)
-    about = json.loads(_read_kept(shared, name, _REPORT))
+    about = json.loads(_read_kept(shared, name, IMPORT_REPORT))
     return ImportInfo(
         scenario=name,
         file=about["file"],
@@ -245,6 +245,8 @@ def _as_download(files: ExportedFiles, name: str, options: Mapping[str, str]) ->
 def _read_kept(shared: Services, name: str, file: str) -> str:
     found = shared.drafts.kept(name, file)
     if found is None:
-        what = "import report of scenario" if file == _REPORT else "plan of a sweep of scenario"
+        what = (
+            "import report of scenario" if file == IMPORT_REPORT else "plan of a sweep of scenario"
+        )
         raise NotFoundError(what, name, [])
     return found

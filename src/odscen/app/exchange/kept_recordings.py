@@ -1,0 +1,564 @@
+"""Recordings kept in the workspace: read once, placed on a map, ready to be looked at by time.
+
+Files that were sent are read by a child process. What is kept of them are the tracks, not the
+files; a scenario of a part is made of these.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import count
+from math import degrees
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import polars as pl
+
+from odscen.app.exchange.imports import DiskFile, maps_for_import
+from odscen.app.exchange.recorded_traffic import show_recording
+from odscen.app.maps import load_map
+from odscen.base.atomic_folders import discard, new_folder
+from odscen.base.checksums import digest
+from odscen.base.errors import InputError, NotFoundError
+from odscen.base.folder_locks import locked
+from odscen.base.shown import printable
+from odscen.base.system_errors import disk_errors
+from odscen.formats.base import VERDICTS, ElementReport, ImportMap
+from odscen.formats.tracks.lane_places import estimate_offset, share_on_lanes
+from odscen.formats.tracks.moments import Moments, read_moments, write_moments
+from odscen.formats.tracks.read_recording import choose_recording, map_offset, read_recording
+from odscen.formats.tracks.recorded_traffic import RecordedTraffic, shift_tracks
+from odscen.formats.tracks.scenario_of_tracks import SceneChoice, scenario_of_tracks
+from odscen.maps.allowances import for_recording
+from odscen.maps.child_process import work_in_child
+from odscen.maps.folder_names import check_name, is_name, name_from_file
+from odscen.maps.importers.base import ImportSettings
+from odscen.maps.store import Workspace
+from odscen.opendrive.parse import parse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from odscen.app.exchange.imports import AddedMaps
+    from odscen.maps.map_entry import MapEntry
+    from odscen.maps.store import ProgressCallback
+    from odscen.scenario.document.scenario_document import Scenario
+
+_ABOUT, _TRACKS, _PLACED = "about.json", "tracks.parquet", "placed.parquet"
+_PICTURE: Final = "agreement.svg"
+_FILES: Final = "files"
+_MOST_FILES: Final = 40
+_MAP_ENDINGS: Final = (".xodr", ".osm", ".osm.gz", ".osm.bz2", ".pbf")
+_ON_MAP: Final = 0.8
+"""Share of the states of moving vehicles on lanes from which on a map of the workspace is taken to
+be that of a recording."""
+_PATIENCE: Final = 30.0
+_GHOST_STEP: Final = 0.2
+"""Seconds between places of tracks that a scenario keeps to be shown under it."""
+
+
+class SentPath(NamedTuple):
+    """A file that was sent: the name that its sender gave it, and where it lies."""
+
+    name: str
+    path: Path
+
+
+class FittingMap(NamedTuple):
+    """A map of the workspace, and the share of states of moving vehicles that lie on its lanes."""
+
+    map: str
+    on_lane: float
+
+
+class RecordingScenario(NamedTuple):
+    """A scenario of a part of a recording.
+
+    Attributes
+    ----------
+    report
+        Who became an actor, and who did not: lists by verdict, as plain values.
+    ghosts
+        Tracks that are shown under it, as plain values; see :func:`ghosts_of_tracks`.
+    """
+
+    scenario: Scenario
+    report: dict[str, list[dict[str, Any]]]
+    ghosts: list[dict[str, Any]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptRecording:
+    """A recording of the workspace.
+
+    Attributes
+    ----------
+    about
+        As plain values: ``file``, ``schema``, ``summary``, ``map``, ``offset``, ``agreement``,
+        ``exposure``, ``users``, ``scenes``, ``origin``, ``added`` (maps that came with it) and
+        ``unused`` (files that were sent and not needed).
+    """
+
+    name: str
+    folder: Path
+    about: dict[str, Any]
+
+    def moments(self, begin: float, end: float, *, most: int) -> Moments:
+        """Who was where, see :func:`~odscen.formats.tracks.moments.read_moments`."""
+        with disk_errors(f"recording {self.name!r}"):
+            return read_moments(self.folder, begin, end, most=most)
+
+    def picture(self) -> bytes:
+        """Map and tracks, as SVG; :class:`NotFoundError` without a map."""
+        path = self.folder / _PICTURE
+        if not path.is_file():
+            raise NotFoundError("drawing of recording", self.name, [])
+        return path.read_bytes()
+
+
+def recording_names(workspace: Workspace) -> list[str]:
+    """Names of all recordings, those that came last first."""
+    folder = workspace.recordings
+    if not folder.is_dir():
+        return []
+    found = [path for path in folder.iterdir() if is_name(path.name) and (path / _ABOUT).is_file()]
+    times = {path: (path / _ABOUT).stat().st_mtime for path in found}
+    return [path.name for path in sorted(found, key=lambda path: (-times[path], path.name))]
+
+
+def open_recording(workspace: Workspace, name: str) -> KeptRecording:
+    """One of them.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none of that name.
+    """
+    check_name(name, what="recording")
+    folder = workspace.recordings / name
+    try:
+        about = json.loads((folder / _ABOUT).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise NotFoundError("recording", name, recording_names(workspace)) from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"recording {name!r} is damaged: {error}") from error
+    return KeptRecording(name, folder, about)
+
+
+def remove_recording(workspace: Workspace, name: str) -> None:
+    """Delete a recording; scenarios that were made of it stay as they are."""
+    with disk_errors(f"recording {name!r}"):
+        discard(open_recording(workspace, name).folder)
+
+
+def add_recording(
+    workspace: Workspace,
+    files: Sequence[SentPath],
+    *,
+    on_map: str | None = None,
+    progress: ProgressCallback,
+) -> KeptRecording:
+    """Keep a recording, with its map.
+
+    That is ``on_map``, else the one that was sent with it or is in its file (lanelets, OpenDRIVE),
+    which is added to the workspace, else the one of the workspace whose lanes most of its vehicles
+    are on, if that is so of 80 % of their states.
+
+    Parameters
+    ----------
+    files
+        Those of the recording, and perhaps its map.
+
+    Raises
+    ------
+    InputError
+        If there is no recording among the files, or it is damaged; names file, element and value.
+    LimitError
+        If reading needs more than files of their size may.
+    """
+    if len(files) > _MOST_FILES:
+        raise InputError(f"more than {_MOST_FILES} files were sent")
+    named = [SentPath(_safe_name(sent.name), sent.path) for sent in files]
+    maps = [sent for sent in named if sent.name.lower().endswith(_MAP_ENDINGS)]
+    tracks = [sent for sent in named if sent not in maps]
+    if not tracks:
+        raise InputError("no recorded traffic was sent, but maps only")
+    progress("reading the recording", 0.0)
+    stem = name_from_file(Path(tracks[0].name))
+    with _new_recording(workspace, stem) as (name, folder), maps_for_import() as added:
+        (folder / _FILES).mkdir()
+        for sent in tracks:
+            shutil.copyfile(sent.path, folder / _FILES / sent.name)
+        size = sum(sent.path.stat().st_size for sent in tracks)
+        read = _work(
+            "read_sent_recording",
+            folder,
+            size,
+            lambda step, share: progress(step, 0.3 * share),
+            names=[sent.name for sent in tracks],
+        )
+        main = next(sent for sent in tracks if sent.name == read["file"])
+        if read["map_within"]:
+            maps = [*maps, main]
+        chosen = on_map
+        if chosen is None and maps:
+            if len(maps) > 1:
+                listed = ", ".join(sent.name for sent in maps)
+                raise InputError(f"several maps were sent: {listed}; send one")
+            entry = _add_sent_map(
+                workspace, maps[0], read["schema"], added,
+                lambda step, share: progress(step, 0.3 + 0.4 * share),
+            )  # fmt: skip
+            chosen = entry.name
+        progress("placing the recording on a map", 0.7)
+        _work(
+            "place_kept_recording",
+            folder,
+            size,
+            lambda step, share: progress(step, 0.7 + 0.3 * share),
+            workspace=str(workspace.root),
+            map_name=chosen,
+            find=chosen is None,
+            offset="",
+            estimate=False,
+            added=[entry.name for entry in added],
+        )
+        shutil.rmtree(folder / _FILES)
+    return open_recording(workspace, name)
+
+
+def place_recording(
+    workspace: Workspace,
+    name: str,
+    *,
+    on_map: str,
+    offset: str = "",
+    estimate: bool = False,
+    progress: ProgressCallback,
+) -> KeptRecording:
+    """Place a recording on another map, or elsewhere on it.
+
+    Parameters
+    ----------
+    offset
+        ``X,Y[,DEGREES]`` from the frame of the file to that of the map.
+    estimate
+        Whether it is then moved onto the lanes.
+
+    Raises
+    ------
+    InputError
+        If the offset is none, or none can be estimated.
+    NotFoundError
+        If there is no such map.
+    """
+    kept = open_recording(workspace, name)
+    map_offset(offset)
+    workspace.stored(on_map)
+    progress("placing the recording on a map", 0.0)
+    size = (kept.folder / _TRACKS).stat().st_size
+    with (
+        disk_errors(f"recording {name!r}"),
+        locked(kept.folder, what=f"recording {name!r}", patience=_PATIENCE),
+        new_folder(kept.folder) as folder,
+    ):
+        for file in (_ABOUT, _TRACKS):
+            shutil.copyfile(kept.folder / file, folder / file)
+        _work(
+            "place_kept_recording",
+            folder,
+            4 * size,  # it is packed
+            progress,
+            workspace=str(workspace.root),
+            map_name=on_map,
+            find=False,
+            offset=offset,
+            estimate=estimate,
+            added=[],
+        )
+    return open_recording(workspace, name)
+
+
+def fitting_maps(workspace: Workspace, rows: pl.DataFrame) -> list[FittingMap]:
+    """Maps of the workspace on whose lanes moving vehicles of a recording are, the best first."""
+    found = []
+    for entry in workspace.maps():
+        share = share_on_lanes(rows, entry.graph())
+        if share > 0.0:
+            found.append(FittingMap(entry.name, round(share, 4)))
+    return sorted(found, key=lambda fit: (-fit.on_lane, fit.map))
+
+
+def fitting_maps_of(workspace: Workspace, name: str) -> list[FittingMap]:
+    """The same for one that is kept, where it is placed now."""
+    kept = open_recording(workspace, name)
+    with disk_errors(f"recording {name!r}"):
+        return fitting_maps(workspace, pl.read_parquet(kept.folder / _PLACED))
+
+
+def scenario_of_recording(
+    workspace: Workspace, name: str, choice: SceneChoice, *, begin: float, end: float
+) -> RecordingScenario:
+    """A scenario of a part of a recording.
+
+    With an ego it has the criterion that this one does not collide.
+
+    Raises
+    ------
+    InputError
+        If the recording has no map, or as of
+        :func:`~odscen.formats.tracks.scenario_of_tracks.scenario_of_tracks`.
+    """
+    kept = open_recording(workspace, name)
+    about = kept.about
+    if about["map"] is None:
+        raise InputError("a scenario needs a map: choose the one that the recording is of")
+    if not begin < end:
+        raise InputError(f"the window from {begin:g} to {end:g} s is empty")
+    rows = (
+        pl.scan_parquet(kept.folder / _PLACED)
+        .filter(pl.col("time").is_between(begin - 1e-6, end + 1e-6))
+        .collect()
+    )
+    if not rows.height:
+        raise InputError(f"the recording has no road user from {begin:g} to {end:g} s")
+    entry = workspace.map_for(about["map"], about["map_sha256"])
+    the_map = ImportMap(
+        entry.name, entry.sha256, load_map(entry).sumo, lambda: parse(entry.read("xodr"))
+    )
+    report = ElementReport(about["file"])
+    scenario = scenario_of_tracks(
+        RecordedTraffic(rows, about["schema"], about["summary"]["step"]),
+        the_map,
+        choice,
+        name=f"{name} {begin:g} to {end:g} s",
+        assets=workspace.assets(),
+        report=report,
+    )
+    if any(actor.ego for actor in scenario.actors):
+        scenario = scenario.model_copy(update={"criteria": ("collided(ego) == 0",)})
+    actors = {
+        row.xpath.removeprefix("road user "): row.reason.removeprefix("actor ")
+        for row in report.lists["taken"]
+    }
+    lists = {verdict: [row._asdict() for row in report.lists[verdict]] for verdict in VERDICTS}
+    step = min(max(round(about["summary"]["step"], 3), 0.01), 0.1)
+    later = step - float(rows["time"].min())  # type: ignore[arg-type]
+    return RecordingScenario(scenario, lists, ghosts_of_tracks(rows, actors, later))
+
+
+def ghosts_of_tracks(
+    rows: pl.DataFrame, actors: dict[str, str], later: float
+) -> list[dict[str, Any]]:
+    """Tracks as they are shown under a scenario.
+
+    Parameters
+    ----------
+    actors
+        Of each road user that became one, the actor.
+    later
+        Seconds by which the time of the run is later than that of the recording.
+
+    Returns
+    -------
+    list of dict
+        Of each: ``id``, ``actor`` (null: none), ``category``, ``length``, ``width`` and columns
+        ``time`` (s of the run), ``x``, ``y`` (m) and ``hdg`` (rad), five in a second.
+    """
+    ghosts = []
+    for (user,), own in rows.group_by("id", maintain_order=True):
+        cell = (pl.col("time") / _GHOST_STEP).floor()
+        is_last = pl.int_range(pl.len()) == pl.len() - 1
+        kept = own.filter((cell != cell.shift()).fill_null(value=True) | is_last)
+        length, width = (own[size].drop_nulls().median() for size in ("length", "width"))
+        ghosts.append(
+            {
+                "id": str(user),
+                "actor": actors.get(str(user)),
+                "category": own["category"][0],
+                "length": length or 4.5,
+                "width": width or 1.8,
+                "time": [round(time + later, 3) for time in kept["time"]],
+                **{name: [round(v, 3) for v in kept[name]] for name in ("x", "y", "hdg")},
+            }
+        )
+    return ghosts
+
+
+# ---------------------------------------------------------------------------- files and maps
+
+
+def _safe_name(name: str) -> str:
+    bare = printable(PurePosixPath(name.replace("\\", "/")).name)
+    return re.sub(r"[^\w.,()+ -]", "_", bare).lstrip(".")[:120] or "file"
+
+
+def _free_name(stem: str, taken: Sequence[str]) -> str:
+    names = (stem if n == 1 else f"{stem[:56]}-{n}" for n in count(1))
+    return next(name for name in names if name not in taken)
+
+
+@contextmanager
+def _new_recording(workspace: Workspace, stem: str) -> Iterator[tuple[str, Path]]:
+    """Yield a free name, and the folder that becomes that recording."""
+    name = check_name(_free_name(stem, recording_names(workspace)), what="recording")
+    final = workspace.recordings / name
+    with (
+        disk_errors("recordings"),
+        locked(final, what=f"recording {name!r}"),
+        new_folder(final) as folder,
+    ):
+        yield name, folder
+
+
+def _work(
+    job: str, folder: Path, size: int, progress: ProgressCallback, **arguments: Any
+) -> dict[str, Any]:
+    return work_in_child(
+        f"{__name__}:{job}",
+        what="reading the recording",
+        arguments={"folder": str(folder), **arguments},
+        folders=(folder,),
+        allowance=for_recording(size),
+        progress=progress,
+    )
+
+
+def _add_sent_map(
+    workspace: Workspace,
+    sent: SentPath,
+    schema: str,
+    added: AddedMaps,
+    progress: ProgressCallback,
+) -> MapEntry:
+    """The map of a file that was sent, added if the workspace does not have it."""
+    content = sent.path.read_bytes()
+    sha256 = digest(content)
+    # These count metres from latitude and longitude 0.
+    counts_from_zero = schema in ("interaction", "sind") and sent.name.lower().endswith(".osm")
+    options = {"origin": "0,0"} if counts_from_zero else {}
+
+    def is_same(entry: MapEntry) -> bool:
+        if entry.sha256 == sha256:
+            return True
+        given = all(entry.importing.options.get(key) == options[key] for key in options)
+        return entry.source_sha256 == sha256 and given
+
+    known = workspace.first_map(is_same)
+    if known is not None:
+        return known
+    entry = workspace.add_map_content(
+        content,
+        file=sent.name,
+        name=_free_name(name_from_file(Path(sent.name)), workspace.map_names()),
+        importing=ImportSettings(options=options),
+        progress=progress,
+    )
+    added.append(entry)
+    return entry
+
+
+# ---------------------------------------------------------------------------- in the child
+
+
+def read_sent_recording(
+    *, folder: str, names: Sequence[str], progress: Callable[[str, float], None]
+) -> dict[str, Any]:
+    """Read the files, and write their tracks and what is known of them; a job of a child.
+
+    Returns
+    -------
+    dict
+        ``file``, ``schema``, and ``map_within``: whether the file has a map, too.
+    """
+    progress("reading the recording", 0.0)
+    place = Path(folder)
+    files = [DiskFile(place / _FILES / name) for name in names]
+    main = files[choose_recording(files)]
+    recorded = read_recording(main)
+    recorded.rows.write_parquet(place / _TRACKS)
+    needed = {main.name, *recorded_beside(main.name, names)}
+    about = {
+        "file": main.name,
+        "schema": recorded.schema,
+        "summary": recorded.summary(),
+        "unused": sorted(set(names) - needed),
+    }
+    (place / _ABOUT).write_text(json.dumps(about), encoding="utf-8")
+    within = main.name.lower().endswith(".xml")
+    return {"file": main.name, "schema": recorded.schema, "map_within": within}
+
+
+def recorded_beside(main: str, names: Sequence[str]) -> list[str]:
+    """Names of files that readers look for beside one of a recording."""
+    pairs = [
+        ("vehicle_tracks", "pedestrian_tracks"),
+        ("pedestrian_tracks", "vehicle_tracks"),
+        ("Veh_smoothed", "Ped_smoothed"),
+        ("Ped_smoothed", "Veh_smoothed"),
+        ("_tracks.", "_tracksMeta."),
+        ("_tracks.", "_recordingMeta."),
+    ]
+    wanted = {main.replace(own, other) for own, other in pairs if own in main}
+    if "smoothed_tracks" in main:
+        wanted.add("Traffic_Lights.csv")
+    return sorted(wanted & set(names))
+
+
+def place_kept_recording(
+    *,
+    folder: str,
+    workspace: str,
+    map_name: str | None,
+    find: bool,
+    offset: str,
+    estimate: bool,
+    added: Sequence[str],
+    progress: Callable[[str, float], None],
+) -> dict[str, Any]:
+    """Place tracks on a map, find their scenes, and write them by time; a job of a child."""
+    progress("placing the recording on a map", 0.0)
+    place, store = Path(folder), Workspace.open(Path(workspace))
+    about = json.loads((place / _ABOUT).read_text(encoding="utf-8"))
+    rows = pl.read_parquet(place / _TRACKS)
+    if find:
+        progress("looking for its map", 0.1)
+        fits = fitting_maps(store, rows)
+        map_name = fits[0].map if fits and fits[0].on_lane >= _ON_MAP else None
+    entry = None if map_name is None else store.map(map_name)
+    x, y, turn = map_offset(offset)
+    rows = rows if (x, y, turn) == (0.0, 0.0, 0.0) else shift_tracks(rows, x, y, turn)
+    if estimate and entry is not None:
+        dx, dy, more = estimate_offset(rows, entry.graph())
+        rows = shift_tracks(rows, dx, dy, more)
+        moved = shift_tracks(pl.DataFrame({"x": [x], "y": [y], "hdg": [turn]}), dx, dy, more)
+        x, y, turn = (float(moved[name][0]) for name in ("x", "y", "hdg"))
+    progress("looking for scenes", 0.3)
+    picture = None if entry is None else place / _PICTURE
+    recorded = RecordedTraffic(rows, about["schema"], about["summary"]["step"])
+    shown = show_recording(recorded, entry, picture=picture)
+    progress("writing it by time", 0.8)
+    shown.rows.write_parquet(place / _PLACED)
+    users, origin = write_moments(shown.rows, place)
+    about |= {
+        "map": None if entry is None else entry.name,
+        "map_sha256": None if entry is None else entry.sha256,
+        "added": list(added) or about.get("added", []),
+        "offset": [round(x, 3), round(y, 3), round(degrees(turn), 4)],
+        "agreement": shown.summary.get("agreement"),
+        "exposure": shown.summary["exposure"],
+        "users": users,
+        "origin": origin,
+        "bounds": [
+            round(getattr(shown.rows[axis], least)(), 3)
+            for least in ("min", "max")
+            for axis in ("x", "y")
+        ],
+        "scenes": shown.scenes.to_dicts(),
+    }
+    (place / _ABOUT).write_text(json.dumps(about), encoding="utf-8")
+    return {}

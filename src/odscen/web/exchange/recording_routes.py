@@ -1,0 +1,334 @@
+"""Routes for recorded traffic: kept, placed on a map, looked at by time, made a scenario of."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from fastapi import APIRouter, File, Form, Query, UploadFile
+from pydantic import Field
+from starlette.responses import Response
+
+from odscen.app.exchange.kept_recordings import (
+    SentPath,
+    add_recording,
+    fitting_maps_of,
+    open_recording,
+    place_recording,
+    recording_names,
+    remove_recording,
+    scenario_of_recording,
+)
+from odscen.base.atomic_folders import scratch_folder
+from odscen.base.categories import Category
+from odscen.formats.tracks.scenario_of_tracks import SceneChoice
+from odscen.web.exchange.exchange_routes import IMPORT_REPORT
+from odscen.web.jobs import JobResult
+from odscen.web.messages import Answer, JobStarted, Name, RequestBody
+from odscen.web.services import Shared
+from odscen.web.wire.media_types import SVG, answers
+
+if TYPE_CHECKING:
+    from odscen.app.exchange.kept_recordings import KeptRecording
+    from odscen.maps.store import ProgressCallback
+
+_MOST_ROWS = 1_000_000
+_GHOSTS = "ghosts.json"
+
+SceneKind = Literal["hard_braking", "short_ttc", "lane_change", "cut_in", "crossing_pedestrian"]
+Second = Annotated[float, Field(ge=-1e10, le=1e10, allow_inf_nan=False)]
+
+
+class RecordingRow(Answer):
+    """A recording, for a list; seconds as it counts them."""
+
+    name: str
+    file: str
+    road_users: int
+    begin: float
+    end: float
+    map: str | None
+
+
+class RecordedUser(Answer):
+    """A road user; seconds and metres. Its row is its number in moments."""
+
+    id: str
+    category: Category
+    kind: str | None
+    begin: float
+    end: float
+    length: float
+    width: float
+
+
+class RecordedScene(Answer):
+    """A scene that meets a criterion; ``value`` is the worst, see ``docs/recordings.md``."""
+
+    kind: SceneKind
+    id: str
+    other: str | None
+    begin: float
+    end: float
+    x: float
+    y: float
+    value: float
+
+
+class MapAgreement(Answer):
+    """How well states lie on lanes: shares, and metres left of their middles."""
+
+    states: int
+    on_lane: float
+    wrong_way: float
+    offset_median: float | None = None
+    offset_95: float | None = None
+
+
+class SceneFrequency(Answer):
+    """How often scenes of a kind are."""
+
+    kind: SceneKind
+    count: int
+    per_hour: float | None
+    per_100_km: float | None
+
+
+class RecordingInfo(RecordingRow):
+    """All that is known of a recording but the places of road users.
+
+    ``published_schema`` is that of its file; ``offset`` metres and degrees to the frame of the map;
+    ``added`` maps that came with it; ``unused`` files that were sent with it and not needed.
+    ``origin`` is added to places of moments, ``bounds`` are those of the tracks, metres.
+    """
+
+    published_schema: str
+    step: float
+    notes: list[str]
+    added: list[str]
+    unused: list[str]
+    offset: tuple[float, float, float]
+    origin: tuple[float, float]
+    bounds: tuple[float, float, float, float]
+    vehicles: MapAgreement | None
+    pedestrians: MapAgreement | None
+    hours: float
+    vehicle_km: float
+    frequencies: list[SceneFrequency]
+    users: list[RecordedUser]
+    scenes: list[RecordedScene]
+
+
+class FittingMapInfo(Answer):
+    """A map, and the share of states of moving vehicles on its lanes, in their direction."""
+
+    map: str
+    on_lane: float
+
+
+class RecordingPlace(RequestBody):
+    """The map that a recording is of, and metres and degrees to its frame, ``X,Y[,DEGREES]``.
+
+    With ``estimate`` it is moved onto the lanes from there.
+    """
+
+    map: Name
+    offset: Annotated[str, Field(max_length=100)] = ""
+    estimate: bool = False
+
+
+class RecordingPart(RequestBody):
+    """A part of a recording that a scenario is made of; ``ego`` may be empty."""
+
+    begin: Second
+    end: Second
+    ego: Annotated[str, Field(max_length=200)] = ""
+    follow: Literal["track", "react", "drive"] = "track"
+
+
+class Ghost(Answer):
+    """The track of a road user under a scenario; seconds of the run, metres, radians."""
+
+    id: str
+    actor: str | None
+    category: Category | None
+    length: float
+    width: float
+    time: list[float]
+    x: list[float]
+    y: list[float]
+    hdg: list[float]
+
+
+router = APIRouter(prefix="/api/recordings")
+ghosts = APIRouter(prefix="/api/scenarios")
+
+
+@router.get("")
+def list_recordings(shared: Shared) -> list[RecordingRow]:
+    """All recordings, those that came last first."""
+    names = recording_names(shared.workspace)
+    return [_row_of(open_recording(shared.workspace, name)) for name in names]
+
+
+@router.post("", status_code=202)
+def add_sent_recording(
+    shared: Shared,
+    files: Annotated[
+        list[UploadFile],
+        File(description="A recording, the files that belong to it, and if need be its map."),
+    ],
+    on_map: Annotated[str | None, Form(alias="map", max_length=64)] = None,
+) -> JobStarted:
+    """Keep a recording, in the background; the result is its name."""
+    with ExitStack() as opened:
+        folder = opened.enter_context(scratch_folder())
+        sent = []
+        for row, file in enumerate(files):
+            path = folder / f"sent-{row}"
+            with path.open("wb") as out:
+                shutil.copyfileobj(file.file, out)
+            sent.append(SentPath(file.filename or "file", path))
+        kept = opened.pop_all()
+
+    def work(progress: ProgressCallback) -> JobResult:
+        with kept:
+            progress("starting", 0.0)
+            added = add_recording(shared.workspace, sent, on_map=on_map, progress=progress)
+            return JobResult(added.name)
+
+    try:
+        subject = f"the recording {', '.join(sorted(one.name for one in sent))}"
+        return JobStarted(job=shared.jobs.start(work, subject=subject))
+    except BaseException:
+        kept.close()
+        raise
+
+
+@router.get("/{name}")
+def show_recording(name: str, shared: Shared) -> RecordingInfo:
+    """What a recording has: road users, scenes, and how well it lies on its map."""
+    kept = open_recording(shared.workspace, name)
+    about = kept.about
+    agreement = about["agreement"] or {}
+    often = about["exposure"]
+    return RecordingInfo(
+        **_row_of(kept).model_dump(),
+        published_schema=about["schema"],
+        step=about["summary"]["step"],
+        notes=about["summary"]["notes"],
+        added=about["added"],
+        unused=about["unused"],
+        offset=about["offset"],
+        origin=about["origin"],
+        bounds=about["bounds"],
+        vehicles=agreement.get("vehicles"),
+        pedestrians=agreement.get("pedestrians"),
+        hours=often["hours"],
+        vehicle_km=often["vehicle_km"],
+        frequencies=[SceneFrequency(kind=kind, **found) for kind, found in often["scenes"].items()],
+        users=about["users"],
+        scenes=about["scenes"],
+    )
+
+
+@router.delete("/{name}")
+def delete_recording(name: str, shared: Shared) -> RecordingRow:
+    """Delete a recording; scenarios that were made of it stay."""
+    row = _row_of(open_recording(shared.workspace, name))
+    remove_recording(shared.workspace, name)
+    return row
+
+
+@router.get("/{name}/maps")
+def list_fitting_maps(name: str, shared: Shared) -> list[FittingMapInfo]:
+    """Maps on whose lanes the vehicles of a recording are, the best first."""
+    found = fitting_maps_of(shared.workspace, name)
+    return [FittingMapInfo(map=fit.map, on_lane=fit.on_lane) for fit in found]
+
+
+@router.post("/{name}/map", status_code=202)
+def set_recording_map(name: str, place: RecordingPlace, shared: Shared) -> JobStarted:
+    """Place a recording on a map, in the background."""
+    open_recording(shared.workspace, name)
+
+    def work(progress: ProgressCallback) -> JobResult:
+        kept = place_recording(
+            shared.workspace,
+            name,
+            on_map=place.map,
+            offset=place.offset,
+            estimate=place.estimate,
+            progress=progress,
+        )
+        return JobResult(kept.name)
+
+    return JobStarted(job=shared.jobs.start(work, subject=f"recording {name!r}"))
+
+
+@router.get("/{name}/picture", response_class=Response, responses=SVG)
+def recording_picture(name: str, shared: Shared) -> Response:
+    """Map and tracks, with places that are on no lane circled."""
+    content = open_recording(shared.workspace, name).picture()
+    return Response(content, media_type="image/svg+xml", headers={"Cache-Control": "no-cache"})
+
+
+@router.get(
+    "/{name}/moments", response_class=Response, responses=answers("application/octet-stream")
+)
+def recording_moments(
+    name: str,
+    shared: Shared,
+    begin: Annotated[float, Query(ge=-1e10, le=1e10, allow_inf_nan=False)] = -1e10,
+    end: Annotated[float, Query(ge=-1e10, le=1e10, allow_inf_nan=False)] = 1e10,
+    most: Annotated[int, Query(ge=1, le=_MOST_ROWS, description="Rows at most.")] = 300_000,
+) -> Response:
+    """Who was where, in binary; see ``docs/server.md``. Fewer moments if there are too many."""
+    moments = open_recording(shared.workspace, name).moments(begin, end, most=most)
+    return Response(moments.packed(), media_type="application/octet-stream")
+
+
+@router.post("/{name}/scenarios", status_code=202)
+def make_scenario(name: str, part: RecordingPart, shared: Shared) -> JobStarted:
+    """Make a scenario of a part of a recording, in the background; the result is its name."""
+    file = open_recording(shared.workspace, name).about["file"]
+
+    def work(progress: ProgressCallback) -> JobResult:
+        progress("making the scenario", 0.0)
+        made = scenario_of_recording(
+            shared.workspace,
+            name,
+            SceneChoice(part.ego, part.follow),
+            begin=part.begin,
+            end=part.end,
+        )
+        draft = shared.drafts.create(made.scenario, None, stem=name, label="Import")
+        about = {"file": file, "added": False, "lists": made.report}
+        shared.drafts.keep(draft.name, IMPORT_REPORT, json.dumps(about))
+        shared.drafts.keep(draft.name, _GHOSTS, json.dumps(made.ghosts))
+        return JobResult(draft.name)
+
+    subject = f"a scenario of recording {name!r} from {part.begin:g} to {part.end:g} s"
+    return JobStarted(job=shared.jobs.start(work, subject=subject))
+
+
+@ghosts.get("/{name}/ghosts")
+def scenario_ghosts(name: str, shared: Shared) -> list[Ghost]:
+    """Tracks of the recording that a scenario was made of; none of others."""
+    shared.drafts.row(name)
+    kept = shared.drafts.kept(name, _GHOSTS)
+    return [Ghost(**ghost) for ghost in json.loads(kept)] if kept is not None else []
+
+
+def _row_of(kept: KeptRecording) -> RecordingRow:
+    about = kept.about
+    return RecordingRow(
+        name=kept.name,
+        file=about["file"],
+        road_users=len(about["users"]),
+        begin=about["summary"]["begin"],
+        end=about["summary"]["end"],
+        map=about["map"],
+    )

@@ -1,0 +1,157 @@
+"""Recordings sent to the server: placed, looked at by time, made scenarios of."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from odscen.app.exchange.imports import DiskFile
+from odscen.base.errors import InputError
+from odscen.formats.tracks.read_recording import choose_recording
+from tests.formats.tracks.test_tracks_on_maps import crossing_traffic
+from tests.web.conftest import job as result_of
+
+if TYPE_CHECKING:
+    from starlette.testclient import TestClient
+
+COLUMNS = 5
+
+
+def send(client: TestClient, files: dict[str, bytes]) -> Any:
+    sent = [("files", (name, content)) for name, content in files.items()]
+    return result_of(client, client.post("/api/recordings", files=sent))
+
+
+@pytest.fixture
+def recording(client: TestClient) -> str:
+    job = send(client, {"crossing.csv": crossing_traffic().write_csv().encode()})
+    assert job["state"] == "done", job
+    return str(job["result"])
+
+
+def moments(content: bytes) -> tuple[Any, Any, Any]:
+    count, rows = struct.unpack_from("<II", content)
+    times = np.frombuffer(content, "<f8", count, 8)
+    first = np.frombuffer(content, "<u4", count + 1, 8 + 8 * count)
+    body = np.frombuffer(content, "<f4", COLUMNS * rows, 8 + 8 * count + 4 * (count + 1))
+    return times, first, body.reshape(rows, COLUMNS)
+
+
+def test_a_recording_finds_its_map_and_is_looked_at_by_time(
+    client: TestClient, recording: str
+) -> None:
+    info = client.get(f"/api/recordings/{recording}").json()
+    assert info["map"] == "signal_crossing"
+    assert info["vehicles"]["on_lane"] > 0.99
+    assert {scene["kind"] for scene in info["scenes"]} >= {"cut_in", "hard_braking"}
+    assert b"<svg" in client.get(f"/api/recordings/{recording}/picture").content
+    fits = client.get(f"/api/recordings/{recording}/maps").json()
+    assert [fit["map"] for fit in fits] == ["signal_crossing"]
+
+    times, first, rows = moments(client.get(f"/api/recordings/{recording}/moments").content)
+    file = crossing_traffic()
+    assert len(rows) == file.height
+    assert times[[0, -1]].tolist() == [10.0, 21.96]
+    origin = info["origin"]
+    for k in (0, 100, len(times) - 1):
+        own = rows[first[k] : first[k + 1]]
+        seen = {
+            info["users"][int(user)]["id"]: (x + origin[0], y + origin[1])
+            for user, x, y, _, _ in own.tolist()
+        }
+        there = file.filter((file["time"] - times[k]).abs() < 1e-6)
+        expected = {name: (x, y) for name, x, y in there.select("id", "x", "y").iter_rows()}
+        assert seen.keys() == expected.keys()
+        for name, place in seen.items():
+            assert place == pytest.approx(expected[name], abs=1e-4)
+    # One moment more on each side of a part; fewer, evenly, if there are too many rows.
+    part = client.get(f"/api/recordings/{recording}/moments?begin=12&end=13").content
+    assert moments(part)[0][[0, -1]] == pytest.approx([12.0, 13.0], abs=0.041)
+    few = moments(client.get(f"/api/recordings/{recording}/moments?most=100").content)[0]
+    assert len(few) <= 100
+    assert np.ptp(np.diff(few)) < 1e-6
+
+
+def test_a_part_becomes_a_scenario_with_its_tracks_as_ghosts(
+    client: TestClient, recording: str
+) -> None:
+    part = {"begin": 10.0, "end": 16.0, "ego": "behind", "follow": "react"}
+    job = result_of(client, client.post(f"/api/recordings/{recording}/scenarios", json=part))
+    assert job["state"] == "done", job
+    state = client.get(f"/api/scenarios/{job['result']}").json()
+    document = state["document"]
+    assert [actor["id"] for actor in document["actors"] if actor["ego"]] == ["behind"]
+    assert document["criteria"] == ["collided(ego) == 0"]
+    assert not [one for one in state["problems"] if one["severity"] == "error"]
+    ghosts = {one["id"]: one for one in client.get(f"/api/scenarios/{job['result']}/ghosts").json()}
+    assert ghosts["cuts"]["actor"] == "cuts"
+    # In the time of the run, 0.04 s later than that of the recording less its first instant.
+    assert ghosts["cuts"]["time"][0] == pytest.approx(0.04)
+    assert ghosts["cuts"]["time"][-1] == pytest.approx(6.04)
+    assert (ghosts["cuts"]["x"][0], ghosts["cuts"]["y"][0]) == pytest.approx((-75.0, 0.0))
+    report = client.get(f"/api/scenarios/{job['result']}/import").json()
+    assert report["file"] == "crossing.csv"
+
+    other = client.post("/api/scenarios", json={"map": "signal_crossing"}).json()["name"]
+    assert client.get(f"/api/scenarios/{other}/ghosts").json() == []
+    wrong = result_of(
+        client,
+        client.post(f"/api/recordings/{recording}/scenarios", json=part | {"ego": "nobody"}),
+    )
+    assert "no road user 'nobody'" in wrong["error"]["message"]
+
+    assert client.get("/api/recordings").json()[0]["name"] == recording
+    client.delete(f"/api/recordings/{recording}")
+    assert client.get("/api/recordings").json() == []
+    assert client.get(f"/api/recordings/{recording}").status_code == 404
+    assert client.get(f"/api/scenarios/{job['result']}/ghosts").json() != []
+
+
+def test_a_recording_that_lies_elsewhere_is_moved_onto_the_lanes(client: TestClient) -> None:
+    away = crossing_traffic().with_columns(x=crossing_traffic()["x"] + 500.0)
+    job = send(client, {"away.csv": away.write_csv().encode()})
+    name = job["result"]
+    assert client.get(f"/api/recordings/{name}").json()["map"] is None
+    refused = client.post(f"/api/recordings/{name}/scenarios", json={"begin": 10, "end": 16})
+    assert "needs a map" in result_of(client, refused)["error"]["message"]
+    place = {"map": "signal_crossing", "offset": "-500,1.2", "estimate": True}
+    job = result_of(client, client.post(f"/api/recordings/{name}/map", json=place))
+    assert job["state"] == "done", job
+    info = client.get(f"/api/recordings/{name}").json()
+    assert info["vehicles"]["on_lane"] > 0.99
+    assert info["offset"][1] == pytest.approx(0.0, abs=0.35)
+    unknown = client.post(f"/api/recordings/{name}/map", json={"map": "nowhere"})
+    assert result_of(client, unknown)["error"]["kind"] == "NotFoundError"
+
+
+def test_of_several_files_the_tracks_are_read(tmp_path: Path) -> None:
+    def file(name: str, titles: str) -> DiskFile:
+        (tmp_path / name).write_text(f"{titles}\n")
+        return DiskFile(tmp_path / name)
+
+    levelx = [
+        file("07_tracksMeta.csv", "trackId,width,length,class"),
+        file("07_recordingMeta.csv", "recordingId,frameRate"),
+        file("07_tracks.csv", "trackId,frame,xCenter,yCenter,heading,xVelocity,yVelocity"),
+    ]
+    assert choose_recording(levelx) == 2
+    interaction = "track_id,frame_id,timestamp_ms,agent_type,x,y,vx,vy"
+    both = [file(f"{kind}_tracks_000.csv", interaction) for kind in ("pedestrian", "vehicle")]
+    assert choose_recording(both) == 1
+    with pytest.raises(InputError, match="several recordings were sent"):
+        choose_recording([*levelx, both[1]])
+    with pytest.raises(InputError, match="none of the files has tracks"):
+        choose_recording(levelx[:2])
+
+
+def test_what_is_no_recording_is_refused_with_its_place(client: TestClient) -> None:
+    job = send(client, {"tracks.csv": b"time,x,y\n0,1,2\n1,here,2\n"})
+    assert "'here' is not a number" in job["error"]["message"]
+    assert "line 3 > column x" in job["error"]["message"]
+    job = send(client, {"road.xodr": b"<OpenDRIVE/>"})
+    assert "no recorded traffic was sent" in job["error"]["message"]
+    assert client.get("/api/recordings").json() == []
