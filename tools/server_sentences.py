@@ -28,6 +28,7 @@ SHOWN = (
     "carla/mirror/",
     "carla/served/",
     "carla/server/",
+    "metadrive/metadrive_run",
     "convert/",
     "formats/__init__",
     "formats/base",

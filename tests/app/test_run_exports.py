@@ -332,6 +332,42 @@ def test_the_osi_trace_shows_one_bulb_of_each_light(exports: Path) -> None:
         assert sum(lit for _, lit in bulbs) == 1
 
 
+def test_an_mcap_trace_has_the_same_messages_and_describes_them(
+    workspace: Workspace, run: Run, exports: Path, tmp_path: Path
+) -> None:
+    reader = pytest.importorskip("mcap.reader")
+    files = export_run(workspace, run.folder, tmp_path, to="osi", options={"container": "mcap"})
+    trace = next(file for file in files if file.suffix == ".mcap")
+    plain = read_osi_trace(_file(exports, "osi/*.osi"), 0.0, math.inf).rows
+    assert read_osi_trace(trace, 0.0, math.inf).rows.equals(plain)
+    with trace.open("rb") as stream:
+        opened = reader.make_reader(stream)
+        summary = opened.get_summary()
+        (metadata,) = opened.iter_metadata()
+        times = [message.log_time for _, _, message in opened.iter_messages()]
+    (schema,) = summary.schemas.values()
+    (channel,) = summary.channels.values()
+    assert (schema.name, schema.encoding) == ("osi3.GroundTruth", "protobuf")
+    assert channel.metadata["net.asam.osi.trace.channel.osi_version"] == "3.7.0"
+    assert (metadata.name, metadata.metadata["version"]) == ("net.asam.osi.trace", "3.7.0")
+    assert times == [round(time * 1e9) for time in sorted(set(plain["time"].to_list()))]
+    # The names of the schema's messages and of the first field of each.
+    (file,) = [dict_of for _, dict_of in osi_fields(schema.data)]
+    messages = [list(osi_fields(value)) for number, value in osi_fields(file) if number == 4]
+    named = {
+        dict(parts)[1]: [dict(osi_fields(v)) for n, v in parts if n == 2] for parts in messages
+    }
+    truth = {field[3]: field[1] for field in named[b"GroundTruth"]}
+    assert truth[2] == b"timestamp"
+    assert truth[5] == b"moving_object"
+    again = export_run(
+        workspace, run.folder, tmp_path / "b", to="osi", options={"container": "mcap"}
+    )
+    assert next(file for file in again if file.suffix == ".mcap").read_bytes() == trace.read_bytes()
+    with pytest.raises(InputError, match="container is osi or mcap, not 'zip'"):
+        export_run(workspace, run.folder, tmp_path / "c", to="osi", options={"container": "zip"})
+
+
 def test_a_long_run_is_no_single_osi_trace(
     workspace: Workspace, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -165,7 +165,8 @@ export interface paths {
          * List Simulators
          * @description Simulators that are installed, for a new run: those that ship are the first.
          *
-         *     The address of a CARLA server is the one that this server was started with.
+         *     The address of a CARLA server is the one that this server was started with, and what programs it
+         *     starts is its business: a simulator that ships has no such options here.
          */
         get: operations["list_simulators_api_simulators_get"];
     };

@@ -11,7 +11,10 @@ import { ModelChoice } from "./ModelChoice";
 const others = (): Promise<Offered[]> =>
   models.simulators().then((all) => all.filter(({ name }) => name !== "sumo" && name !== "carla-mirror"));
 
-const simulatorWords = (name: string): string => (name === "carla-native" ? t`CARLA alone` : name);
+const simulatorWords = (name: string): string => {
+  if (name === "carla-native") return t`CARLA alone`;
+  return name === "metadrive" ? "MetaDrive" : name;
+};
 
 /** What plays the scenario, and what of it that simulator does not do. */
 export function SimulatorChoice({

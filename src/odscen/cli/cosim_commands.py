@@ -205,6 +205,12 @@ def cosim(
     weather: Annotated[
         bool, typer.Option("--weather/--no-weather", help="Whether weather acts on driving.")
     ] = True,
+    carla_python: Annotated[
+        Path | None,
+        typer.Option(
+            help="A Python that has odscen and carla, which carries this out.", metavar="PATH"
+        ),
+    ] = None,
     record_protocol: Annotated[
         Path | None,
         typer.Option(
@@ -232,6 +238,11 @@ def cosim(
     Exit code 0: completed; 1: --selfcheck found differences; 2: bad input; 3: the run or the
     server failed; 130: interrupted.
     """
+    if carla_python is not None:
+        from odscen.cli.other_python import carry_out_elsewhere
+
+        code = carry_out_elsewhere(carla_python, "--carla-python", package="carla")
+        raise typer.Exit(code)
     from odscen.carla.mirror.cosim import cosim as run_cosim
     from odscen.carla.mirror.cosim_options import CosimOptions
     from odscen.carla.mirror.nearby import Nearby

@@ -1,4 +1,4 @@
-"""Traces of ASAM OSI 3: a ``GroundTruth`` for each record of a run.
+"""Traces of ASAM OSI 3: a ``GroundTruth`` for each record of a run, as ``.osi`` or MCAP.
 
 A ``.osi`` file is messages, each after its length in four bytes, little-endian
 (``open-simulation-interface``, ``doc/architecture/trace_file_formats.adoc``). Fields have the
@@ -14,7 +14,7 @@ import struct
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import InputError
-from odscen.formats.base import WINDOW_OPTIONS, Format
+from odscen.formats.base import WINDOW_OPTIONS, Format, FormatOption
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from odscen.records.run_plan import PlannedActor
 
 VERSION = (3, 7, 0)
+CONTAINERS = ("osi", "mcap")
 MOST_STATES = 2_000_000
 """Road users times records; a state takes 190 bytes of the file."""
 
@@ -53,13 +54,19 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
     Raises
     ------
     InputError
-        If it is no run, an option is no number, or the window has no road users, or too many.
+        If it is no run, an option is not possible, or the window has no road users, or too many.
+    MissingDependencyError
+        If it is to be MCAP, and the package to write that is not installed.
     """
     import polars as pl
 
     from odscen.formats.recordings.map_elements import map_elements
+    from odscen.formats.recordings.osi_mcap import write_mcap
     from odscen.formats.recordings.record import WINDOW, lane_signals, seconds_option
 
+    container = source.options.get("container", CONTAINERS[0])
+    if container not in CONTAINERS:
+        raise InputError(f"container is osi or mcap, not {container!r}")
     recorded = source.recorded
     if recorded is None or source.roads is None:
         raise InputError("this format says what happened in a run: name the folder of one")
@@ -86,7 +93,7 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
     ego = next((number[user.id] for user in users if user.ego), 0)
     bodies = {user.id: _body_of(source, user, number[user.id]) for user in users}
     lights, of_map = _encode_lights(signals, lanes), _fields_of_map(source)
-    trace = bytearray()
+    frames: list[tuple[float, bytes]] = []
     instants = enumerate(zip(times.tolist(), _encode_instants(states, bodies), strict=True))
     for instant, (time, (present, objects)) in instants:
         colors = signals.color[:, instant].tolist()
@@ -100,10 +107,11 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
                 of_map,
             )
         )
-        trace += struct.pack("<I", len(content)) + content
+        frames.append((time, content))
+    version = ".".join(map(str, VERSION))
     said = {
         "format": "osi",
-        "osi_version": ".".join(map(str, VERSION)),
+        "osi_version": version,
         "run": source.name,
         "map": _map_name(source),
         "step": round(recorded.step, 6),
@@ -120,8 +128,13 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
             )
         ],
     }
+    if container == "mcap":
+        described = f"Ground truth of the run {source.name} of odscen"
+        trace = write_mcap(frames, version=version, description=described)
+    else:
+        trace = b"".join(struct.pack("<I", len(content)) + content for _, content in frames)
     return {
-        f"{source.name}.osi": bytes(trace),
+        f"{source.name}.{container}": trace,
         f"{source.name}.export.json": json.dumps(said, indent=2, ensure_ascii=False) + "\n",
         _map_name(source): source.map_file,
     }
@@ -268,9 +281,12 @@ def _encode_identifier(field: int, number: int) -> bytes:
 FORMAT = Format(
     id="osi",
     title="ASAM OSI trace",
-    label="ground truth of a run as an ASAM OSI trace (.osi)",
+    label="ground truth of a run as an ASAM OSI trace (.osi or .mcap)",
     of=("run",),
     write=write_osi_trace,
-    options=WINDOW_OPTIONS,
+    options=(
+        *WINDOW_OPTIONS,
+        FormatOption("container", "What the messages are in.", CONTAINERS, CONTAINERS[0]),
+    ),
     needs_roads=True,
 )

@@ -49,9 +49,9 @@ def render_parity(
     """
     title = str(figures["scenario"] or "Run")
     position, heading = figures["position_error_m"], figures["heading_error_deg"]
-    wrong = figures["lights"]["wrong"]
+    wrong, shown_by = figures["lights"]["wrong"], figures["shown_by"]
     if position is None:
-        style, verdict = "bad", "CARLA showed no road user"
+        style, verdict = "bad", f"{shown_by} showed no road user"
     elif position["max"] <= GOAL_M and heading["max"] <= GOAL_DEG and not wrong:
         style, verdict = "good", "Both worlds agree"
     else:
@@ -66,13 +66,14 @@ def render_parity(
     names.append(f"over {format_length(STEPS_M[-1])}")
     return render_page(
         "parity_report.html.j2",
-        title=f"{title} - SUMO and CARLA compared",
+        title=f"{title} - SUMO and {shown_by} compared",
         scenario=title,
         verdict=verdict,
         style=style,
         figures=figures,
+        shown_by=shown_by,
         errors=errors,
-        map=_error_map(states, drawing),
+        map=_error_map(states, drawing, shown_by),
         map_legend=[(f"e{i}", name) for i, name in enumerate(names)],
         over_time=_error_chart(states),
         worst=[row for row in figures["worst"] if row["position"] >= NOTHING],
@@ -93,7 +94,7 @@ def format_length(value: float | None) -> str:
     return f"{number(value * 100.0, 2)} cm" if value < 1.0 else f"{number(value, 2)} m"
 
 
-def _error_map(states: pl.DataFrame, drawing: MapDrawing | None) -> Markup | None:
+def _error_map(states: pl.DataFrame, drawing: MapDrawing | None, shown_by: str) -> Markup | None:
     corner, error = errors_by_place(states, size=CELL)
     bounds = fitted_view(corner, drawing)
     if bounds is None or not len(corner):
@@ -105,7 +106,7 @@ def _error_map(states: pl.DataFrame, drawing: MapDrawing | None) -> Markup | Non
     steps = np.searchsorted(STEPS_M, error, side="left")
     return element(
         "svg",
-        element("title", "Map: largest distance between SUMO and CARLA by place"),
+        element("title", f"Map: largest distance between SUMO and {shown_by} by place"),
         ground,
         *shaded_cells(corner, CELL, steps, [f"e{i}" for i in range(len(STEPS_M) + 1)]),
         scale_bar(bounds),

@@ -130,6 +130,10 @@ class PositionRecord:
         self._record_step(time, list(there.values()))
         self._time, self._steps = time, self._steps + 1
 
+    def collide(self, time: float, name: str, partner: str, x: float, y: float) -> None:
+        """Take in that two road users collide at a time, s, and the middle of their contact."""
+        self._events.append(Event(time, EventKind.COLLISION, name, x, y, partner=partner))
+
     def write(self, folder: Path) -> SimulationOutcome:
         """Write the records into the folder of the run, and say how it ended."""
         trips = {

@@ -6,7 +6,6 @@ so a lost command, a vehicle that physics has moved, or a light that another pro
 
 from __future__ import annotations
 
-import json
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +13,7 @@ import numpy as np
 
 from odscen.base.frames import CarlaPose, XodrPose, carla_to_xodr
 from odscen.carla.server.blueprints import Shape
-from odscen.figures.measures.parity import parity_figures, with_errors
-from odscen.reports.parity_report import render_parity
-from odscen.runs import layout
+from odscen.simulators.parity_files import PARITY_LIGHTS, PARITY_STATES, write_parity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,8 +25,6 @@ if TYPE_CHECKING:
     from odscen.records.run_plan import Plan
     from odscen.sumo.runner.in_step import Step
 
-_STATES = ("time", "row", "x", "y", "z", "hdg", "carla_x", "carla_y", "carla_z", "carla_hdg")
-_LIGHTS = ("time", "signal", "sumo", "carla")
 _NO_SHAPE = Shape((0.0, 0.0, 0.0))
 _NOWHERE = (math.nan, math.nan, math.nan, math.nan)
 
@@ -81,27 +76,20 @@ class StateRecorder:
         """States and lights, as :mod:`odscen.figures.measures.parity` wants them."""
         import polars as pl
 
-        table = np.concatenate([np.empty((0, len(_STATES))), *self._states])
-        states = pl.DataFrame(table, schema=_STATES, orient="row").with_columns(
+        table = np.concatenate([np.empty((0, len(PARITY_STATES))), *self._states])
+        states = pl.DataFrame(table, schema=PARITY_STATES, orient="row").with_columns(
             pl.col("row").cast(pl.Int64)
         )
         types = (pl.Float64, pl.String, pl.String, pl.String)
         lights = pl.DataFrame(
-            self._lights, schema=dict(zip(_LIGHTS, types, strict=True)), orient="row"
+            self._lights, schema=dict(zip(PARITY_LIGHTS, types, strict=True)), orient="row"
         )
         return states, lights
 
     def write(self, folder: Path, drawing: MapDrawing | None) -> None:
         """Write the parity report, its figures and its tables into a run folder."""
         states, lights = self.tables()
-        states = with_errors(states)
-        states.write_parquet(folder / layout.PARITY_STATES_FILE)
-        lights.write_parquet(folder / layout.PARITY_LIGHTS_FILE)
-        figures = parity_figures(states, lights, self._plan)
-        text = json.dumps(figures, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-        (folder / layout.PARITY_FIGURES_FILE).write_text(text, encoding="utf-8")
-        page = render_parity(figures, states, drawing=drawing)
-        (folder / layout.PARITY_FILE).write_text(page, encoding="utf-8")
+        write_parity(folder, states, lights, self._plan, drawing)
 
     def _ground_pose(
         self, snapshot: Any, row: int, actor: int | None

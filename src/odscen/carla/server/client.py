@@ -143,7 +143,8 @@ def import_carla() -> Any:
     except ImportError as error:
         raise MissingDependencyError(
             "the package carla is not installed: pip install 'odscen[carla]' on CPython 3.11 or "
-            "3.12 (there is none for newer ones)"
+            "3.12 (there is none for newer ones), or name a Python that has it: odscen cosim "
+            "--carla-python PATH"
         ) from error
     return carla
 

@@ -6,7 +6,8 @@ Pure functions of two tables. ``states`` has a row for each road user and step o
 
 body centres in the OpenDRIVE frame, metres and radians, ``row`` being that of the plan; CARLA's
 columns are NaN where it showed no road user. ``lights`` has a row for each step and signal that
-both know: ``time, signal, sumo, carla``.
+both know: ``time, signal, sumo, carla``. The simulator beside SUMO may be another than CARLA; the
+columns keep their names.
 """
 
 from __future__ import annotations
@@ -45,13 +46,17 @@ def with_errors(states: pl.DataFrame) -> pl.DataFrame:
     ).with_columns(pl.col("position", "height", "heading").fill_nan(None))
 
 
-def parity_figures(states: pl.DataFrame, lights: pl.DataFrame, plan: Plan) -> dict[str, Any]:
+def parity_figures(
+    states: pl.DataFrame, lights: pl.DataFrame, plan: Plan, *, shown_by: str = "CARLA"
+) -> dict[str, Any]:
     """All figures of ``parity.json``.
 
     Parameters
     ----------
     states
         As :func:`with_errors` gives them.
+    shown_by
+        The simulator that is compared with SUMO.
     """
     both = states.filter(states["position"].is_not_null())
     total = states.height
@@ -59,6 +64,7 @@ def parity_figures(states: pl.DataFrame, lights: pl.DataFrame, plan: Plan) -> di
         "format": FORMAT,
         "version": VERSION,
         "scenario": plan.scenario,
+        "shown_by": shown_by,
         "steps": states["time"].n_unique(),
         "samples": total,
         "mirrored": both.height,

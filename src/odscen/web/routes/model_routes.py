@@ -9,12 +9,20 @@ from fastapi import APIRouter
 from odscen.app.generators import installed_generators
 from odscen.app.maps import map_of
 from odscen.app.running.runs import run_map, unsupported_parts
-from odscen.simulators.installed import installed_simulators, open_simulator
+from odscen.simulators.installed import (
+    CARLA_MIRROR,
+    CARLA_NATIVE,
+    METADRIVE,
+    installed_simulators,
+    open_simulator,
+)
 from odscen.sumo.worker.behaviour.behaviour_doors import installed_behaviours
 from odscen.web.messages import Name, OfferedInfo, ProblemInfo
 from odscen.web.services import Shared
 
 router = APIRouter(prefix="/api")
+_OF_THE_SERVER = frozenset({"address", "python"})
+"""Options that whoever starts the server decides."""
 
 
 @router.get("/generators")
@@ -33,12 +41,13 @@ def list_behaviours() -> list[OfferedInfo]:
 def list_simulators() -> list[OfferedInfo]:
     """Simulators that are installed, for a new run: those that ship are the first.
 
-    The address of a CARLA server is the one that this server was started with.
+    The address of a CARLA server is the one that this server was started with, and what programs it
+    starts is its business: a simulator that ships has no such options here.
     """
     rows = []
     for offered in installed_simulators():
-        kept = tuple(option for option in offered.options if option.name != "address")
-        shipped = offered.name.startswith("carla-")
+        kept = tuple(option for option in offered.options if option.name not in _OF_THE_SERVER)
+        shipped = offered.name in (CARLA_MIRROR, CARLA_NATIVE, METADRIVE)
         rows.append(OfferedInfo.of(offered._replace(options=kept) if shipped else offered))
     return rows
 

@@ -1,0 +1,1 @@
+"""Scenarios in MetaDrive, which runs in a Python of its own."""
