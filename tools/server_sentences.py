@@ -32,6 +32,7 @@ SHOWN = (
     "convert/",
     "formats/__init__",
     "formats/base",
+    "experiments/ineffective",
     "experiments/journal",
     "experiments/plan",
     "experiments/search",

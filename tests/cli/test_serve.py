@@ -61,6 +61,20 @@ def test_on_this_machine_too_the_token_is_needed_unless_it_is_declined(tmp_path)
 
 
 @pytest.mark.slow
+def test_the_token_stays_over_a_restart_until_a_new_one_is_wanted(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    tokens = []
+    for options in ((), (), ("--new-token",)):
+        with served("--workspace", str(tmp_path / "workspace"), *options) as process:
+            page, token = re.search(r"http://\S+", process.stderr.readline())[0].split("?token=")
+            tokens.append(token)
+            # Who had the first token is let in after the restart.
+            if len(tokens) == 2:
+                assert get(bearing(page + "api/health", tokens[0]))[0] == 200
+    assert tokens[0] == tokens[1] != tokens[2]
+
+
+@pytest.mark.slow
 def test_a_token_of_ones_own_comes_from_the_environment_and_stays(tmp_path, monkeypatch):
     monkeypatch.setenv("ODSCEN_TOKEN", "a-token-of-my-own")
     with served("--workspace", str(tmp_path)) as process:

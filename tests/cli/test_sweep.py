@@ -59,7 +59,19 @@ def test_a_dry_run_lists_the_cases_and_runs_none(scenario: Path, tmp_path: Path)
         {"parameter": "per_minute", "from": 1.0, "to": 20.0, "steps": None}
     ]
     assert len(usual["cases"]) == 4
+    assert usual["without_effect"] == {}
     assert not (tmp_path / "busy-sweep").exists()
+
+
+def test_a_dry_run_says_which_variables_have_no_effect(scenario: Path, tmp_path: Path) -> None:
+    data = json.loads(scenario.read_text(encoding="utf-8"))
+    data["parameters"]["idle"] = {"value": 1, "min": 1, "max": 2}
+    scenario.write_text(json.dumps(data), encoding="utf-8")
+    given = ("--vary", "idle=1,2", "--vary", "per_minute=2,4", "--dry-run", "--json")
+    found = odscen("sweep", scenario, *given, cwd=tmp_path)
+    reason = "no number of the scenario is computed from it"
+    assert found.json["without_effect"] == {"idle": reason}
+    assert f"idle has no effect: {reason}" in found.err
 
 
 @pytest.mark.slow

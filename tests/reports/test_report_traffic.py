@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -6,8 +7,11 @@ import polars as pl
 import pytest
 
 from odscen.drawing.map_drawing import Lines
-from odscen.figures.by_place.traffic import TrafficFigures, over_run, traffic_figures
+from odscen.figures.by_place.level_of_service import FEWEST
+from odscen.figures.by_place.traffic import TrafficFigures, traffic_figures
+from odscen.reports.front_page import junction_rows, level_notes
 from odscen.reports.page_templates import render_block
+from odscen.reports.place_names import NO_NAMES
 from odscen.reports.report_maps import PlaceShapes, service_map
 from odscen.reports.report_sections import (
     NONE_RECORDED,
@@ -18,11 +22,10 @@ from odscen.reports.report_sections import (
     flow_values,
     level_strip,
     service_values,
-    worst_places,
 )
 from odscen.reports.report_words import stretch
 from tests.figures.made_traffic import NOBODY, PLACES, lane_rows, made_figures
-from tests.reports.test_run_report import EVIL, Reader, report
+from tests.reports.test_run_report import EVIL, PLAN, Reader, planned, report
 
 SHAPES = PlaceShapes(
     {
@@ -39,7 +42,7 @@ def section_of(name, values):
 
 
 def service_section(figures):
-    return section_of("service", service_values(figures))
+    return section_of("service", service_values(figures, NO_NAMES))
 
 
 def diagram_section(network):
@@ -47,16 +50,28 @@ def diagram_section(network):
 
 
 def emission_section(figures):
-    return section_of("emissions", emission_values(figures))
+    return section_of("emissions", emission_values(figures, NO_NAMES))
 
 
 def corridor_section(given):
-    return section_of("corridor", corridor_values(given))
+    return section_of("corridor", corridor_values(given, NO_NAMES))
 
 
 def brief_map(figures, shapes):
-    drawn = service_map(figures, shapes, worst_places(over_run(figures.junctions)))
-    return section_of("brief", {"cards": [], "findings": [], "map": drawn})
+    rows = junction_rows(figures, NO_NAMES)
+    drawn = service_map(figures, shapes, rows, NO_NAMES)
+    return section_of(
+        "brief",
+        {
+            "cards": [],
+            "sentences": [],
+            "map": drawn,
+            "scene_map": None,
+            "junctions": rows,
+            "fewest": FEWEST,
+            "notes": level_notes(figures, rows),
+        },
+    )
 
 
 def words(markup):
@@ -74,8 +89,8 @@ def test_a_junction_has_its_level_delay_and_worst_time():
     # 50, 100, 150 and 60 vehicles lost 5, 30, 90 and 5 s: 17,050 s by 360 of them.
     section = service_section(made_figures())
     rows = cells(section)
-    row = next(row for row in rows if row[0] == "j10")
-    assert row[:4] == ["j10", "signal", "D", "47.4"]
+    row = next(row for row in rows if row[0] == "Junction 10")
+    assert row[:4] == ["Junction 10", "signal", "D", "47.4"]
     assert row[7] == "360"
     assert row[4] == "delay on approaches and inside"
     assert row[9] == "0:30, 90 s"
@@ -88,10 +103,10 @@ def test_the_map_colours_places_and_leaves_those_without_traffic_grey():
     assert re.search(r'href="#place-0" class="los-f"><title>r1: level F, 6 km/h', section)
     assert re.search(r'href="#place-1" class="los-a"><title>r2: level A, 36 km/h', section)
     assert "r9: no traffic" in section
-    assert "j10: level D, 47 s control delay per vehicle" in section
+    assert "Junction 10: level D, 47 s control delay per vehicle" in section
     # The busiest time is the third quarter of an hour, and worse than the whole.
     assert "The busiest time, 0:30 to 0:45 h" in section
-    assert "j10: level F, 90 s control delay per vehicle" in section
+    assert "Junction 10: level F, 90 s control delay per vehicle" in section
 
 
 def test_a_junction_that_nobody_gets_into_has_level_f_and_no_delay():
@@ -99,7 +114,7 @@ def test_a_junction_that_nobody_gets_into_has_level_f_and_no_delay():
     stuck = lane_rows(0, "a_0", 2, length=0.0, lost=900.0, co2=20.0, source=True, sink=False)
     rows = pl.DataFrame([stuck | {"waiting": 1800.0}])
     section = str(brief_map(traffic_figures(rows, PLACES, end=900.0), SHAPES))
-    assert "<title>j10: level F, no vehicle enters it</title>" in section
+    assert "<title>Junction 10: level F, no vehicle enters it</title>" in section
 
 
 def test_a_place_with_few_vehicles_is_not_among_the_worst():
@@ -205,7 +220,8 @@ def test_names_of_places_are_escaped():
 
 
 def test_the_whole_report_holds_every_section_and_is_well_formed():
-    page = report(figures=made_figures(), shapes=SHAPES, corridor=traces())
+    plan = replace(PLAN, actors=tuple(planned(f"car-{k}") for k in range(30)))
+    page = report(plan=plan, figures=made_figures(), shapes=SHAPES, corridor=traces())
     found = re.findall(r'<section id="(\w+)"', page)
     wanted = {
         "brief",
@@ -215,7 +231,6 @@ def test_the_whole_report_holds_every_section_and_is_well_formed():
         "flow",
         "diagram",
         "corridor",
-        "walking",
         "emissions",
     }
     assert wanted <= set(found)

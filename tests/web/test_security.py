@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
 from collections.abc import Iterator
 from urllib.parse import quote
 
@@ -127,6 +130,26 @@ def test_a_browser_without_the_token_is_told_what_to_do(guarded: TestClient) -> 
     told = guarded.get("/api/maps").json()["error"]
     assert told["kind"] == "TokenNeeded"
     assert "Authorization: Bearer" in told["message"]
+
+
+def test_the_question_for_the_token_keeps_the_place(guarded: TestClient) -> None:
+    headers = {"Accept": "text/html", "Sec-Fetch-Site": "same-origin"}
+    asked = guarded.get("/?x=1&y=%22%3E&token=wrong-one", headers=headers).text
+    assert '<form method="get">' in asked
+    assert '<input type="hidden" name="y" value="&quot;&gt;">' in asked
+    assert "wrong-one" not in asked
+    # From the form a redirect, which keeps what is behind the #.
+    led = guarded.get("/?x=1&token=s3cret", headers=headers, follow_redirects=False)
+    assert (led.status_code, led.headers["location"]) == (303, "/?x=1")
+
+
+def test_the_script_behind_the_link_is_the_only_one_allowed(guarded: TestClient) -> None:
+    page = guarded.get("/?token=s3cret", headers={"Accept": "text/html"})
+    (script,) = re.findall(r"<script>(.*?)</script>", page.text)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = page.headers["content-security-policy"]
+    assert f"script-src 'sha256-{digest}'" in policy
+    assert "default-src 'none'" in policy
 
 
 def test_a_socket_needs_the_token_too(guarded: TestClient) -> None:

@@ -93,7 +93,8 @@ def _report(studio: Studio, address: str | None) -> None:
         expect(camera.user.page.get_by_role("heading", level=1)).to_be_visible()
         camera.take("report")
         corridor = camera.user.page.locator("#corridor")
-        corridor.evaluate("one => one.scrollIntoView()")
+        camera.user.page.get_by_role("button", name="Open all parts").click()
+        corridor.evaluate("section => section.scrollIntoView()")
         camera.take("corridor", corridor)
 
 

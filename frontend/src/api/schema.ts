@@ -3287,7 +3287,8 @@ export interface components {
          * @description How many cases a sweep has, and what they will take, from a trial of ``tried``.
          *
          *     ``seconds`` is wall time of all cases, null if the one that was tried takes longer than
-         *     ``patience`` seconds; ``disk`` and ``free`` are bytes.
+         *     ``patience`` seconds; ``disk`` and ``free`` are bytes. ``without_effect`` has a sentence for
+         *     each varied parameter that changes nothing.
          */
         PlannedSweep: {
             cases: number;
@@ -3298,6 +3299,7 @@ export interface components {
             free: number;
             processes: number;
             patience: number;
+            without_effect: string[];
         };
         /** @description A road user that is planned; metres. ``flow`` is the flow that it is a member of. */
         PlannedUser: {

@@ -4,6 +4,7 @@ import { Plural, Trans } from "@lingui/react/macro";
 import { useEffect, useMemo, useRef, useState } from "react";
 
 import { fixed } from "../language/numbers";
+import { served } from "../language/served";
 import { allFigures, installedFigures } from "../api/figures";
 import { type PlannedSweep, sweeps } from "../api/sweeps";
 import type { ScenarioDocument } from "../api/types";
@@ -199,6 +200,13 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           {costOf(planned)}
         </Alert>
       )}
+      {planned?.without_effect.length ? (
+        <Alert role="status" color="yellow" title={t`Variables without effect`}>
+          {planned.without_effect.map((sentence) => (
+            <div key={sentence}>{served(sentence)}</div>
+          ))}
+        </Alert>
+      ) : null}
       <Group>
         <Button
           variant={planned ? "default" : "filled"}

@@ -54,6 +54,7 @@ const planned = {
   cases: 25,
   tried: "case-013",
   case_seconds: 2,
+  without_effect: [],
   seconds: 25,
   disk: 5e6,
   free: 1e9,

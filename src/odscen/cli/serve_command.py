@@ -19,7 +19,7 @@ def serve(
     token: Annotated[
         str | None,
         typer.Option(
-            help="What clients have to show. [default: a new one at each start]",
+            help="What clients have to show. [default: that of the last start]",
             envvar="ODSCEN_TOKEN",
             show_envvar=True,
             show_default=False,
@@ -28,6 +28,10 @@ def serve(
     no_token: Annotated[
         bool,
         typer.Option("--no-token", help="Let anybody on this machine in."),
+    ] = False,
+    new_token: Annotated[
+        bool,
+        typer.Option("--new-token", help="Make a new token; pages and links of before are out."),
     ] = False,
     carla: Annotated[
         str,
@@ -51,6 +55,7 @@ def serve(
         browser=browser,
         token=token,
         open_to_all=no_token,
+        new_token=new_token,
         carla=Address.parse(carla),
         say=log,
     )

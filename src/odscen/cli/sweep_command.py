@@ -27,7 +27,7 @@ from odscen.cli.console import (
 from odscen.cli.scenario_commands import ScenarioArgument
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from odscen.experiments.searches import SearchResult
     from odscen.experiments.sweeps import Sweep
@@ -111,14 +111,18 @@ def sweep(
     0, whether cases are safe or not; 2: bad input; 3: a run failed.
     """
     from odscen.app import scenarios
+    from odscen.experiments.ineffective import variables_without_effect
     from odscen.experiments.sweeps import SweepSettings
     from odscen.experiments.sweeps import sweep as run_sweep
     from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
     planned = _make_plan(document, vary, plan, samples, method, sample_seed)
+    idle = variables_without_effect(document, planned)
+    for name, reason in idle.items():
+        log(f"{name} has no effect: {reason}")
     if dry_run:
-        _show_plan(planned, as_json=as_json)
+        _show_plan(planned, idle, as_json=as_json)
         return
     own, named = _parse_figures(figure or [])
     driven = behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout)
@@ -200,10 +204,10 @@ def _parse_figures(
     return own, tuple(text for text in given if "=" not in text)
 
 
-def _show_plan(plan: SweepPlan, *, as_json: bool) -> None:
+def _show_plan(plan: SweepPlan, idle: Mapping[str, str], *, as_json: bool) -> None:
     cases = plan.cases()
     if as_json:
-        print_json({"plan": plan.to_dict(), "cases": list(cases)})
+        print_json({"plan": plan.to_dict(), "cases": list(cases), "without_effect": dict(idle)})
         return
     rows = [[f"{value:g}" for value in case.values()] for case in cases[:_SHOWN]]
     print_table(f"{len(cases)} cases", plan.names, rows)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from odscen.records.run_events import Event
     from odscen.records.run_plan import Plan, PlannedMeasure, PlannedParking
     from odscen.records.traces import Paths
+    from odscen.reports.place_names import PlaceNames
 
 
 MOSTLY_SPREAD = 0.05
@@ -405,14 +406,19 @@ class ServiceMap(NamedTuple):
 
 
 def service_map(
-    figures: TrafficFigures, shapes: PlaceShapes, worst: Sequence[Mapping[str, Any]]
+    figures: TrafficFigures,
+    shapes: PlaceShapes,
+    worst: Sequence[Mapping[str, Any]],
+    names: PlaceNames,
 ) -> ServiceMap | None:
     """Levels over the run and in its busiest interval; ``None`` if no vehicle drove.
 
     Parameters
     ----------
     worst
-        Rows of the junctions that are named on the map.
+        Rows of the junctions that are numbered on the map, in the order of the table.
+    names
+        Of the places.
     """
     bounds = fitted_view(shapes.points, None)
     if bounds is None:
@@ -432,7 +438,9 @@ def service_map(
         for index, lines in enumerate(shapes.segments.values())
     ]
     layers = [
-        element("g", _service_layer(shapes, segments, junctions, extent), class_=f"for-{key}")
+        element(
+            "g", _service_layer(shapes, segments, junctions, extent, names), class_=f"for-{key}"
+        )
         for key, (_, segments, junctions) in views.items()
     ]
     svg = element(
@@ -440,7 +448,7 @@ def service_map(
         element("title", "Map of the roads and junctions, coloured by level of service"),
         element("defs", *roads),
         *layers,
-        _junction_names(shapes, worst, extent),
+        _junction_numbers(shapes, worst, extent),
         scale_bar(bounds),
         viewBox=view_box(bounds),
         class_="run-map",
@@ -452,17 +460,21 @@ def service_map(
 
 
 def _service_layer(
-    shapes: PlaceShapes, segments: pl.DataFrame, junctions: pl.DataFrame, extent: float
+    shapes: PlaceShapes,
+    segments: pl.DataFrame,
+    junctions: pl.DataFrame,
+    extent: float,
+    names: PlaceNames,
 ) -> Markup:
     rows = {row["segment"]: row for row in segments.iter_rows(named=True)}
     parts = []
     for index, name in enumerate(shapes.segments):
         row = rows.get(name)
         level = None if row is None else row["level"]
-        words = f"{name}: no traffic"
+        words = f"{names.name_segment(name)}: no traffic"
         if row is not None and row["speed"] is not None:
             graded = f"level {level}" if level else f"n/a ({row['vehicles']:,} vehicles)"
-            words = f"{name}: {graded}, {number(row['speed'] * 3.6, 0)} km/h"
+            words = f"{names.name_segment(name)}: {graded}, {number(row['speed'] * 3.6, 0)} km/h"
             if (row["spread"] or 0.0) > MOSTLY_SPREAD:
                 words += f" ({WHOLE_LANE})"
         parts.append(
@@ -483,7 +495,7 @@ def _service_layer(
         delay = row["delay"] if row["control_delay"] is None else row["control_delay"]
         if delay is not None:
             lost = f"{number(delay, 0)} s control delay per vehicle"
-        words = f"{name}: level {row['level']}, {lost}"
+        words = f"{names.name_junction(name)}: level {row['level']}, {lost}"
         cx, cy = round(x * 100), round(-y * 100)
         disc = element("circle", cx=cx, cy=cy, r=radius, class_=_level_style(row["level"]))
         letter = element("text", row["level"], x=cx, y=cy, font_size=round(radius * 1.4),
@@ -496,16 +508,15 @@ def _level_style(level: str | None) -> str:
     return f"los-{level.lower()}" if level else "los-none"
 
 
-def _junction_names(
+def _junction_numbers(
     shapes: PlaceShapes, worst: Sequence[Mapping[str, Any]], extent: float
 ) -> Markup:
-    """Names of the junctions that the table lists, where there is room."""
-    size = extent * 1.7
+    """Numbers of the junctions in the table, where there is room."""
+    size = extent * 2.4
     written: list[tuple[float, float]] = []
     parts = []
-    for row in worst:
-        name = str(row["junction"])
-        middle = shapes.junctions.get(name)
+    for place, row in enumerate(worst, start=1):
+        middle = shapes.junctions.get(str(row["junction"]))
         if middle is None:
             continue
         x, y = (middle * (100.0, -100.0)).tolist()
@@ -513,7 +524,7 @@ def _junction_names(
         if any(abs(x - a) < size * 4 and abs(y - b) < size * 1.2 for a, b in written):
             continue
         written.append((x, y))
-        parts.append(element("text", name, x=round(x), y=round(y), font_size=round(size)))
+        parts.append(element("text", str(place), x=round(x), y=round(y), font_size=round(size)))
     return element("g", *parts, class_="place-names")
 
 

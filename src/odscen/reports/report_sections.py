@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.figures.by_place.traffic import TrafficFigures
+    from odscen.reports.place_names import PlaceNames
 
 MOST_PLACES = 12
 """Rows of each table of places at most, the worst first."""
@@ -44,10 +45,14 @@ FEW = 20
 """Vehicles that a place has to have had to be among the worst: one unlucky driver is no jam."""
 
 
-def service_values(figures: TrafficFigures) -> dict[str, Any] | None:
+def service_values(figures: TrafficFigures, names: PlaceNames) -> dict[str, Any] | None:
     """Worst junctions and turning movements by level of service."""
     junctions = _graded_places("junction", figures.junctions)
     movements = _graded_places("movement", figures.movements)
+    for row in junctions:
+        row["name"] = names.name_junction(row["junction"])
+    for row in movements:
+        row["name"] = names.name_movement(row["movement"])
     if not (junctions or movements):
         return None
     return {"junctions": junctions, "movements": movements, "fewest": FEWEST, "few": FEW}
@@ -103,7 +108,7 @@ def level_strip(times: pl.DataFrame) -> Markup:
     )  # fmt: skip
 
 
-def group_values(groups: pl.DataFrame) -> dict[str, Any] | None:
+def group_values(groups: pl.DataFrame, names: PlaceNames) -> dict[str, Any] | None:
     """Lane groups with the longest queues, demand and capacity per hour.
 
     Parameters
@@ -115,12 +120,15 @@ def group_values(groups: pl.DataFrame) -> dict[str, Any] | None:
 
     if groups.is_empty():
         return None
-    rows = over_run(groups).sort(["queue_metres_p95", "lane_group"], descending=[True, False])
+    whole = over_run(groups).sort(["queue_metres_p95", "lane_group"], descending=[True, False])
     hours = (pl.col("end") - pl.col("begin")) / 3600.0
-    shown = rows.head(MOST_PLACES).with_columns(
+    shown = whole.head(MOST_PLACES).with_columns(
         demand=pl.col("demand") / hours, capacity=pl.col("capacity") / hours
     )
-    return {"rows": shown.to_dicts()}
+    rows = shown.to_dicts()
+    for row in rows:
+        row["name"] = names.name_lane_group(row["lane_group"])
+    return {"rows": rows}
 
 
 MOST_STATIONS = 200
@@ -184,10 +192,18 @@ def _network_chart(
     )
 
 
+ENOUGH = 50
+"""Vehicles below which a mean flow or density of the network says nothing of traffic."""
+
+
+def _has_traffic(network: pl.DataFrame) -> bool:
+    return int(network["departed"].sum() or 0) >= ENOUGH
+
+
 def flow_values(network: pl.DataFrame) -> dict[str, Any] | None:
-    """Three charts over time; ``None`` for a run with one interval only."""
+    """Three charts over time; ``None`` for one interval only or fewer than 50 vehicles."""
     network = network.sort("begin")
-    if network.height < 2:
+    if network.height < 2 or not _has_traffic(network):
         return None
     charts = []
     for name, factor, label in (
@@ -203,11 +219,11 @@ def flow_values(network: pl.DataFrame) -> dict[str, Any] | None:
 
 
 def diagram_values(network: pl.DataFrame) -> dict[str, Any] | None:
-    """Macroscopic fundamental diagram; ``None`` with fewer than four intervals with traffic."""
+    """Macroscopic fundamental diagram; ``None`` with fewer than four intervals or 50 vehicles."""
     import polars as pl
 
     busy = network.sort("begin").filter(pl.col("density") > 0)
-    if busy.height < 4:
+    if busy.height < 4 or not _has_traffic(network):
         return None
     begin, end = float(busy["begin"][0]), float(busy["end"][-1])
     edges = np.linspace(begin, end, TIMES + 1)
@@ -251,7 +267,7 @@ _EMISSION_CHARTS = (
 )
 
 
-def emission_values(figures: TrafficFigures) -> dict[str, Any] | None:
+def emission_values(figures: TrafficFigures, names: PlaceNames) -> dict[str, Any] | None:
     """Totals, charts and the places with most; ``None`` if emissions were not recorded."""
     import polars as pl
 
@@ -267,10 +283,10 @@ def emission_values(figures: TrafficFigures) -> dict[str, Any] | None:
     charts = []
     if network.height > 1:
         hours = (column(network, "end") - column(network, "begin")) / 3600.0
-        for label, unit, names, text in _EMISSION_CHARTS:
+        for label, unit, columns, text in _EMISSION_CHARTS:
             series = [
                 Series(*SUBSTANCES[name], column(network, name) / hours / unit)
-                for name in names
+                for name in columns
                 if name in network.columns and network[name].is_not_null().any()
             ]
             drawn = _network_chart(network, series, y_label=label, description=text)
@@ -293,7 +309,10 @@ def emission_values(figures: TrafficFigures) -> dict[str, Any] | None:
         .sort(["co2", "place"], descending=[True, False])
         .head(MOST_PLACES)
     )
-    return {"cards": cards, "charts": charts, "rows": most.to_dicts(), "total": total["co2"]}
+    rows = most.to_dicts()
+    for row in rows:
+        row["place"] = names.name_place(row["place"])
+    return {"cards": cards, "charts": charts, "rows": rows, "total": total["co2"]}
 
 
 def _format_mass(grams: float) -> str:
@@ -346,25 +365,26 @@ class CorridorTraces:
 NONE_RECORDED = "There are no trajectories to draw: the run was made without them."
 
 
-def corridor_values(traces: CorridorTraces | str) -> dict[str, Any]:
+def corridor_values(traces: CorridorTraces | str, names: PlaceNames) -> dict[str, Any]:
     """Time-space diagram, or the words why there is none."""
     if isinstance(traces, str):
         return {"words": traces, "through": "", "chart": ""}
     junctions = _format_count(len(traces.junctions), "junction")
     words = (
-        f"From {traces.segments[0]} to {traces.segments[-1]}, {number(traces.length, 0)} m "
+        f"From {names.name_segment(traces.segments[0])} to "
+        f"{names.name_segment(traces.segments[-1])}, {number(traces.length, 0)} m "
         f"through {junctions}, {stretch(traces.begin, traces.end)}: "
         f"{_format_count(traces.vehicles, 'vehicle')}."
     )
-    through = ", ".join(name for name, _, _ in traces.junctions)
-    return {"words": words, "through": through, "chart": _time_space_chart(traces)}
+    through = ", ".join(names.name_junction(name) for name, _, _ in traces.junctions)
+    return {"words": words, "through": through, "chart": _time_space_chart(traces, names)}
 
 
 def _format_count(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
-def _time_space_chart(traces: CorridorTraces) -> Markup:
+def _time_space_chart(traces: CorridorTraces, names: PlaceNames) -> Markup:
     frame = ChartFrame(
         clock_axis(traces.begin, traces.end),
         value_axis(traces.length, "distance along the corridor, m", tight=True),
@@ -372,7 +392,7 @@ def _time_space_chart(traces: CorridorTraces) -> Markup:
     )
     left, right = (float(frame.x(value)) for value in (traces.begin, traces.end))
     bands: list[Markup] = []
-    names: list[Markup] = []
+    texts: list[Markup] = []
     labels: list[float] = []
     for name, begin, end in traces.junctions:
         low, high = float(frame.y(begin)), float(frame.y(end))
@@ -381,18 +401,19 @@ def _time_space_chart(traces: CorridorTraces) -> Markup:
         middle = (low + high) / 2 + 4.0
         if all(abs(middle - other) > 14.0 for other in labels):
             labels.append(middle)
-            names.append(text_at(right - 4, middle, name, class_="over", text_anchor="end"))
+            words = names.name_junction(name)
+            texts.append(text_at(right - 4, middle, words, class_="over", text_anchor="end"))
     driven = [
         element("path", d=data, transform="scale(0.1)", class_=f"trace {style}")
         for style, data in zip(("moving", "standing"), _trace_data(frame, traces), strict=True)
     ]
-    words = [("c-moving", "moving vehicle"), ("c-standing", "queued vehicle"),
-             ("c-band", "junction")]  # fmt: skip
+    keys = [("c-moving", "moving vehicle"), ("c-standing", "queued vehicle"),
+            ("c-band", "junction")]  # fmt: skip
     return chart(
         frame,
-        [*bands, *driven, *names],
+        [*bands, *driven, *texts],
         description="Places of vehicles along the corridor over time; red where they are queued",
-        keys=legend(words),
+        keys=legend(keys),
     )
 
 

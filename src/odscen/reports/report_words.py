@@ -40,6 +40,14 @@ def time_words(seconds: float) -> str:
     return clock((seconds + start) % _DAY if start else seconds)
 
 
+def moment(seconds: float) -> str:
+    """``"10:58:17"``, of day if the run has a clock, or ``"4 min 05 s"`` after its start."""
+    if not has_clock():
+        return duration(seconds)
+    of_day = round(seconds + _START.get()) % round(_DAY)
+    return f"{of_day // 3600}:{of_day // 60 % 60:02d}:{of_day % 60:02d}"
+
+
 def duration(seconds: float | None) -> str:
     """``"4 min 05 s"``; empty for ``None``."""
     if seconds is None or not np.isfinite(seconds):

@@ -14,7 +14,7 @@ import numpy as np
 
 from odscen.base.durations import clock
 from odscen.base.markup import number
-from odscen.figures.by_place.traffic import over_run
+from odscen.figures.by_place.level_of_service import FEWEST
 from odscen.figures.measures.conflicts import SERIOUS_DRAC, SERIOUS_PET, SERIOUS_TTC, is_serious
 from odscen.figures.measures.curves import presence
 from odscen.figures.measures.figure import ReportSection, RunData, SummaryPart
@@ -22,7 +22,7 @@ from odscen.figures.measures.gridlock import find_incidents
 from odscen.figures.measures.motion import FORCED, KIND_UNITS, MotionKind, count_by_kind
 from odscen.figures.measures.registry import figure_values
 from odscen.figures.measures.timetable import LATE, stops_served
-from odscen.figures.measures.usability import UsabilityLevel, run_usability
+from odscen.figures.measures.usability import IncidentWords, UsabilityLevel, run_usability
 from odscen.records.outcomes import (
     ActorStatus,
     IncidentKind,
@@ -33,13 +33,20 @@ from odscen.records.outcomes import (
 from odscen.records.run_events import EventKind
 from odscen.records.traces import bin_width, speed_over_time, tidy, travel
 from odscen.reports.charts import Series, line_chart
+from odscen.reports.front_page import (
+    LEVEL_WORDS,
+    MOST_ACTORS,
+    junction_rows,
+    level_notes,
+    scene_sentences,
+    traffic_sentences,
+)
 from odscen.reports.page_templates import render_page
+from odscen.reports.place_names import NO_NAMES
 from odscen.reports.report_cards import Card, figure_cards, named_cards
 from odscen.reports.report_demand import assignment_values
 from odscen.reports.report_maps import (
     CATEGORIES,
-    MOSTLY_SPREAD,
-    WHOLE_LANE,
     run_map,
     service_map,
     worst_incidents,
@@ -52,13 +59,12 @@ from odscen.reports.report_sections import (
     group_values,
     service_values,
     station_values,
-    worst_places,
 )
 from odscen.reports.report_signals import signal_values
-from odscen.reports.report_words import duration, starting_at
+from odscen.reports.report_words import duration, moment, starting_at
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     import polars as pl
 
@@ -73,7 +79,8 @@ if TYPE_CHECKING:
     from odscen.records.run_events import Event
     from odscen.records.run_plan import Plan, PlannedMeasure
     from odscen.records.traces import ActorTravel
-    from odscen.reports.report_maps import PlaceShapes
+    from odscen.reports.place_names import PlaceNames
+    from odscen.reports.report_maps import PlaceShapes, RunMap
     from odscen.reports.report_sections import CorridorTraces
     from odscen.reports.report_signals import LightsOfRun
 
@@ -89,6 +96,7 @@ def render_report(
     every: int = 1,
     figures: TrafficFigures | None = None,
     shapes: PlaceShapes | None = None,
+    names: PlaceNames = NO_NAMES,
     corridor: CorridorTraces | str | None = None,
     conflicts: pl.DataFrame | None = None,
     lights: LightsOfRun | None = None,
@@ -121,6 +129,8 @@ def render_report(
         By place and time, if they were recorded.
     shapes
         Of the map's places, if it is to be coloured by level of service.
+    names
+        Of the map's places, for people.
     corridor
         Vehicles along a corridor, or why there is no diagram of them.
     conflicts
@@ -150,7 +160,7 @@ def render_report(
     end = max(float(summary.get("sim_seconds") or 0.0), recorded, 1.0)
     incidents = find_incidents(plan, actors, events, end=end)
     cut_short = plan.until if summary.get("stopped") else None
-    usability = run_usability(actors, incidents, end=end, until=cut_short)
+    words = IncidentWords(lambda incident: _name_spot(incident, names), moment)
     run = RunData(
         actors, figures, conflicts=conflicts, visits=visits, end=end, parking=parking, motion=motion
     )
@@ -159,27 +169,45 @@ def render_report(
     values = {**given, **counts}
     drawn = run_map(traces, plan, actors, events, drawing, incidents=incidents)
     title = plan.scenario or "Run"
+    scene = len(actors) <= MOST_ACTORS
     with starting_at(plan.clock):
+        usability = run_usability(
+            actors, incidents, end=end, until=cut_short, scene=plan.scene, words=words
+        )
+        asked = list(summary.get("criteria") or ())
         return render_page(
             "run_report.html.j2",
             title=f"{title} - run report",
-            head=_head_values(title, plan, summary, usability, counts),
-            brief=_brief_values(values, usability, figures, shapes),
+            head=_head_values(title, plan, summary, usability),
+            scene=scene,
+            brief=_brief_values(
+                values,
+                usability,
+                None if scene else figures,
+                shapes,
+                names,
+                asked,
+                conflicts,
+                drawn,
+            ),
             figures={
+                "outcomes": _outcome_sentence(counts),
                 "cards": [
                     *figure_cards(ReportSection.KEY_FIGURES, values),
                     _speed_card(traces),
-                ]
+                ],
             },
             measures=measure_values(plan.measures, int(counts["stranded"] or 0)),
-            service=service_values(figures) if figures else None,
-            groups=group_values(figures.lane_groups) if figures else None,
+            service=service_values(figures, names) if figures else None,
+            groups=group_values(figures.lane_groups, names) if figures else None,
             stations=station_values(stations) if stations is not None else None,
-            map=drawn and {**drawn._asdict(), "incidents": bool(incidents), "every": every},
-            incidents=_incident_values(incidents),
+            map=None
+            if scene or drawn is None
+            else {**drawn._asdict(), "incidents": bool(incidents), "every": every},
+            incidents=_incident_values(incidents, names),
             flow=flow_values(figures.network) if figures else None,
             diagram=diagram_values(figures.network) if figures else None,
-            corridor=corridor_values(corridor) if corridor is not None else None,
+            corridor=corridor_values(corridor, names) if corridor is not None else None,
             signals=signal_values(lights, given, drawing=drawing) if lights is not None else None,
             transit=_transit_values(visits, given) if visits is not None else None,
             parking=_parking_values(parking, given) if parking is not None else None,
@@ -189,8 +217,8 @@ def render_report(
             conflicts=conflict_values(conflicts) if conflicts is not None else None,
             walking=_walking_values(given, actors, traces, end=end),
             motion=motion_values(motion, values) if motion is not None else None,
-            emissions=emission_values(figures) if figures else None,
-            criteria=summary.get("criteria") or (),
+            emissions=emission_values(figures, names) if figures else None,
+            criteria=asked,
             expectations=summary.get("expectations") or (),
             events=_event_values(events, actors, problems=summary.get("problems") or ()),
             actors=_actor_values(actors, travel(traces)),
@@ -199,7 +227,7 @@ def render_report(
 
 
 def _head_values(
-    title: str, plan: Plan, summary: Mapping[str, Any], usability: Usability, counts: Values
+    title: str, plan: Plan, summary: Mapping[str, Any], usability: Usability
 ) -> dict[str, Any]:
     style, words = _verdict_words(summary, usability)
     weather = summary.get("environment")
@@ -218,7 +246,6 @@ def _head_values(
         "title": title,
         "verdict": words,
         "style": style,
-        "outcomes": _outcome_sentence(counts),
         "reason": summary.get("error") or summary.get("reason"),
         "facts": [fact for fact in facts if fact[1] not in (None, "")],
     }
@@ -239,7 +266,7 @@ def _verdict_words(summary: Mapping[str, Any], usability: Usability) -> tuple[st
     expectations = [row for rows in asked.values() for row in rows or ()]
     kind = " and ".join(name for name, rows in asked.items() if rows)
     missed = sum(not row.get("passed") for row in expectations)
-    words = usability.level.capitalize()
+    words = LEVEL_WORDS[usability.level].capitalize()
     if summary.get("scene") and expectations and usability.level is not UsabilityLevel.NOT_USABLE:
         words = "Not passed" if missed else "Passed"
     if missed:
@@ -273,17 +300,9 @@ def _outcome_sentence(counts: Values) -> str:
     return "; ".join(parts) + "."
 
 
-BRIEF_FIGURES = (
-    "arrived",
-    "mean_delay",
-    "mean_latent_delay",
-    "mean_speed",
-    "throughput",
-    "worst_junction_delay",
-)
+TRAFFIC_FIGURES = ("arrived", "mean_delay", "mean_speed", "worst_junction_delay")
+SCENE_FIGURES = ("arrived", "collided", "min_ttc", "min_pet")
 """Figures of the run that the first page has; those that it does not have are left out."""
-
-MOST_FINDINGS = 3
 
 
 def _brief_values(
@@ -291,39 +310,38 @@ def _brief_values(
     usability: Usability,
     figures: TrafficFigures | None,
     shapes: PlaceShapes | None,
+    names: PlaceNames,
+    criteria: Sequence[Mapping[str, Any]],
+    conflicts: pl.DataFrame | None,
+    trajectories: RunMap | None,
 ) -> dict[str, Any]:
-    """Figures, findings, and the map of levels of service if there are figures and shapes."""
-    findings = [reason.words for reason in usability.reasons]
-    drawn = None
-    if figures is not None:
-        findings += _place_findings(figures)
-        if shapes is not None:
-            drawn = service_map(figures, shapes, worst_places(over_run(figures.junctions)))
+    """Sentences, cards, map and table of the first page; ``figures`` are ``None`` for a scene."""
+    if figures is None:
+        return {
+            "sentences": scene_sentences(values, usability, criteria, conflicts),
+            "cards": named_cards(SCENE_FIGURES, values),
+            "map": None,
+            "scene_map": trajectories,
+            "junctions": [],
+            "fewest": FEWEST,
+            "notes": [],
+        }
+    rows = junction_rows(figures, names)
     return {
-        "cards": named_cards(BRIEF_FIGURES, values),
-        "findings": [f"{words[:1].upper()}{words[1:]}." for words in findings[:MOST_FINDINGS]],
-        "map": drawn,
+        "sentences": traffic_sentences(values, usability, rows),
+        "cards": named_cards(TRAFFIC_FIGURES, values),
+        "map": service_map(figures, shapes, rows, names) if shapes is not None else None,
+        "scene_map": None,
+        "junctions": rows,
+        "fewest": FEWEST,
+        "notes": level_notes(figures, rows),
     }
 
 
-def _place_findings(figures: TrafficFigures) -> Iterator[str]:
-    """The worst movement and the slowest segment, if they are at capacity or beyond."""
-    for row in worst_places(over_run(figures.movements))[:1]:
-        if row["level"] in ("E", "F"):
-            name = str(row["movement"]).replace(">", " > ")
-            yield (
-                f"the turning movement {name} has level of service {row['level']}: "
-                f"{number(row['shown'], 0)} s control delay for {row['vehicles']:,} vehicles"
-            )
-    segments = over_run(figures.segments)
-    slow = segments.filter(segments["level"].is_in(["E", "F"])).sort("time_loss", descending=True)
-    for row in slow.head(1).iter_rows(named=True):
-        yield (
-            f"segment {row['segment']}, the one with most time lost, has level of service "
-            f"{row['level']}: "
-            f"{number(row['speed'] * 3.6, 0)} km/h for {row['vehicles']:,} vehicles"
-            + (f" ({WHOLE_LANE})" if (row["spread"] or 0.0) > MOSTLY_SPREAD else "")
-        )
+def _name_spot(incident: Incident, names: PlaceNames) -> str:
+    if incident.x is None or incident.y is None:
+        return incident.place or incident.lane or incident.actor
+    return names.describe_spot(incident.x, incident.y)
 
 
 def _speed_card(traces: pl.DataFrame) -> Card:
@@ -411,15 +429,13 @@ def measure_values(measures: Sequence[PlannedMeasure], stranded: int = 0) -> dic
     return {"rows": rows, "stranded": stranded}
 
 
-def _incident_values(incidents: Sequence[Incident]) -> dict[str, Any] | None:
+def _incident_values(incidents: Sequence[Incident], names: PlaceNames) -> dict[str, Any] | None:
     if not incidents:
         return None
     shown = worst_incidents(incidents)
     rows = []
     for place, incident in enumerate(shown, start=1):
-        where = incident.place or incident.lane or ""
-        if incident.x is not None and incident.y is not None:
-            where = f"x {number(incident.x, 0)} m, y {number(incident.y, 0)} m ({where})"
+        where = _name_spot(incident, names)
         until = number(incident.until, 0) if incident.until is not None else "did not dissolve"
         if incident.kind is IncidentKind.NOT_INSERTED:
             until = "not inserted"

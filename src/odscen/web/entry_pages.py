@@ -1,4 +1,4 @@
-"""Pages that need nothing but their text and run no script.
+"""Pages that need nothing but their text; only that behind the printed link runs a script.
 
 Two of the token, the one that asks for it and the one behind the printed link, and the list of what
 programs can ask the server for.
@@ -6,10 +6,15 @@ programs can ask the server for.
 
 from __future__ import annotations
 
+import base64
+import hashlib
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from starlette.responses import HTMLResponse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 _STYLE = """
 :root { color-scheme: light dark; }
@@ -36,25 +41,38 @@ _HEADERS = {
     "Cache-Control": "no-store",
 }
 
+_LEAD_ON = (
+    'const link = document.querySelector("a");'
+    "link.hash = location.hash;"
+    "location.replace(link.href);"
+)
+_LEAD_ON_DIGEST = base64.b64encode(hashlib.sha256(_LEAD_ON.encode()).digest()).decode()
 
-def token_needed(*, wrong: bool) -> HTMLResponse:
-    """Say what to do where the token is missing, or is not the one of now."""
+
+def token_needed(*, wrong: bool, query: Sequence[tuple[str, str]] = ()) -> HTMLResponse:
+    """Say what to do where the token is missing, or is not the one of now.
+
+    The form leads to where one wanted to go: it has no address of its own, so that a browser keeps
+    the path and what is behind the #, and ``query`` is what the address had besides.
+    """
     told = '<p class="wrong" role="alert">This is not the token of the server as it runs now.</p>'
+    given = [(escape(name, quote=True), escape(value, quote=True)) for name, value in query]
+    kept = "".join(f'<input type="hidden" name="{key}" value="{text}">' for key, text in given)
     body = f"""<h1>This page needs the token of its server</h1>
 {told if wrong else ""}
 <p>Others may use this computer too, so odscen opens only for those who started it. Do one of
 these:</p>
 <ul>
 <li>Open the link that <code>odscen serve</code> printed in its terminal when it was started. It
-ends in <code>/?token=</code> and a long text. Each start has a token of its own.</li>
+ends in <code>/?token=</code> and a long text.</li>
 <li>Copy the text after <code>token=</code> from there into this field.</li>
 </ul>
-<form method="get" action="/">
+<form method="get">{kept}
 <label for="token">Token</label>
 <div><input id="token" name="token" type="password" autocomplete="off" autofocus required>
 <button>Open odscen</button></div>
 </form>
-<p>Came here by a link of another page? <a href="/">Load this page again.</a></p>"""
+<p>Came here by a link of another page? Load this page again.</p>"""
     return HTMLResponse(_html_page("odscen: token needed", body), status_code=401, headers=_HEADERS)
 
 
@@ -63,12 +81,14 @@ def enter(address: str) -> HTMLResponse:
 
     A page rather than a redirect: the browser sends a SameSite=Strict cookie only if it comes from
     here, and it comes from a terminal, a file or somebody's notes. It takes the place of the link
-    in the history.
+    in the history. A script keeps what is behind the #; without scripts one comes to the page.
     """
     shown = escape(address, quote=True)
     body = f'<p>Opening <a href="{shown}">odscen</a> ...</p>'
-    head = f'<meta http-equiv="refresh" content="0;url={shown}">'
-    return HTMLResponse(_html_page("odscen", body, head), headers=_HEADERS)
+    head = f'<noscript><meta http-equiv="refresh" content="0;url={shown}"></noscript>'
+    page = _html_page("odscen", f"{body}<script>{_LEAD_ON}</script>", head)
+    policy = f"{_HEADERS['Content-Security-Policy']}; script-src 'sha256-{_LEAD_ON_DIGEST}'"
+    return HTMLResponse(page, headers={**_HEADERS, "Content-Security-Policy": policy})
 
 
 def interface_page(schema: dict[str, Any]) -> HTMLResponse:

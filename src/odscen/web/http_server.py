@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import resource
-import secrets
 import socket
 import threading
 import webbrowser
@@ -13,6 +12,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import uvicorn
+from platformdirs import user_state_path
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from odscen.base.atomic_folders import scratch_folder
@@ -20,6 +20,7 @@ from odscen.base.errors import InputError, WorkspaceError
 from odscen.carla.server.client import Address
 from odscen.maps.wastebasket import Wastebasket
 from odscen.web.application import create_app
+from odscen.web.kept_token import kept_token
 from odscen.web.security import LOOPBACK, check_token
 
 if TYPE_CHECKING:
@@ -93,6 +94,7 @@ def serve(
     browser: bool = True,
     token: str | None = None,
     open_to_all: bool = False,
+    new_token: bool = False,
     carla: Address = Address(),  # noqa: B008 - immutable
     say: Callable[[str], None] = lambda _line: None,
 ) -> None:
@@ -107,9 +109,12 @@ def serve(
     browser
         Open the page in the user's browser.
     token
-        What clients have to show, by link, cookie or as bearer; one is made if none is given.
+        What clients have to show, by link, cookie or as bearer; that of the workspace's last start
+        if none is given, see :mod:`odscen.web.kept_token`.
     open_to_all
         Ask for no token: whoever can reach the address may use it. Only on this machine.
+    new_token
+        Make a new token and forget that of the last start.
     carla
         Where the CARLA server is that runs can be shown on, if there is one.
     say
@@ -127,7 +132,13 @@ def serve(
         raise InputError(
             f"--no-token is for this machine only, and {host} can be reached from others"
         )
-    token = None if open_to_all else check_token(token or secrets.token_urlsafe(24))
+    if open_to_all:
+        token = None
+    elif token:
+        check_token(token)
+    else:
+        tokens = user_state_path("odscen", appauthor=False) / "tokens"
+        token = kept_token(workspace.root, tokens, renew=new_token)
     hosts = None if host in _ANY else LOOPBACK | {host.lower()}
     bound = _bind_socket(host, port)
     port = bound.getsockname()[1]

@@ -12,7 +12,7 @@ import re
 import time
 from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qs, urlencode, urlsplit
+from urllib.parse import parse_qs, parse_qsl, urlencode, urlsplit
 
 from fastapi import HTTPException
 from starlette.datastructures import Headers
@@ -84,7 +84,11 @@ class Guard:
         elif self._token is not None and not self._has_token(headers, scope):
             await _ask_for_token(headers, scope, receive, send)
         elif self._token is not None and (clean := _without_token(scope)) is not None:
-            response = enter(clean) if _is_page(headers) else RedirectResponse(clean, 303)
+            # What is led on by a redirect keeps its place behind the #, but a browser that comes
+            # from elsewhere would not send the cookie then.
+            here = headers.get("sec-fetch-site") == "same-origin"
+            leads = _is_page(headers) and not here
+            response = enter(clean) if leads else RedirectResponse(clean, 303)
             name = _cookie_name(scope)
             response.set_cookie(name, self._token, httponly=True, samesite="strict", path="/")
             await response(scope, receive, send)
@@ -148,6 +152,11 @@ class Guard:
         await self._app(scope, counted, send)
 
 
+def is_token(text: str) -> bool:
+    """Whether a text can be a token."""
+    return _TOKEN.fullmatch(text) is not None
+
+
 def check_token(token: str) -> str:
     """Return a token of the user's own if it can be one.
 
@@ -156,7 +165,7 @@ def check_token(token: str) -> str:
     InputError
         If it is short, or has characters that an address or a cookie cannot have as they are.
     """
-    if not _TOKEN.fullmatch(token):
+    if not is_token(token):
         raise InputError("the token must have 16 to 256 letters, digits, '-' or '_'")
     return token
 
@@ -186,8 +195,10 @@ def _is_page(headers: Headers) -> bool:
 
 async def _ask_for_token(headers: Headers, scope: Scope, receive: Receive, send: Send) -> None:
     if scope["type"] == "http" and scope["method"] in ("GET", "HEAD") and _is_page(headers):
-        wrong = b"token=" in scope["query_string"]
-        await token_needed(wrong=wrong)(scope, receive, send)
+        query = parse_qsl(scope["query_string"].decode("latin-1"), keep_blank_values=True)
+        kept = [(name, value) for name, value in query if name != "token"]
+        wrong = len(kept) < len(query)
+        await token_needed(wrong=wrong, query=kept)(scope, receive, send)
         return
     message = (
         "this server needs the token that it printed when it was started: open that link again, "

@@ -8,6 +8,7 @@ import pytest
 from odscen.base.errors import InputError
 from odscen.figures.by_place.traffic import TABLES, over_run
 from odscen.figures.measures.traffic_files import places_from_json, read_tables, write_tables
+from odscen.reports.place_names import NO_NAMES
 from odscen.reports.report_sections import service_values
 from tests.figures.made_traffic import made_figures
 
@@ -51,6 +52,6 @@ def test_tables_of_an_earlier_version_are_read_and_shown_by_their_delay(tmp_path
     assert found is not None
     (junction,) = over_run(found.junctions).to_dicts()
     assert (junction["control_delay"], junction["level"]) == (None, "D")
-    service = service_values(found)
+    service = service_values(found, NO_NAMES)
     assert service is not None
     assert round(service["junctions"][0]["shown"], 1) == 47.4

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from contextlib import nullcontext
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import polars as pl
@@ -21,13 +22,16 @@ from odscen.figures.measures.registry import figure_values
 from odscen.figures.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.figures.measures.summary import actors_from_json
 from odscen.figures.measures.traffic_files import read_stations, read_tables
+from odscen.opendrive.road_names import road_names
 from odscen.records.assignment_steps import Assignment
 from odscen.records.light_programs import programs_from_json
 from odscen.records.outcomes import RunStatus
 from odscen.records.row_text import rounded
 from odscen.records.run_events import events_from_json
 from odscen.records.run_plan import Plan
+from odscen.reports.place_names import NO_NAMES, place_names
 from odscen.reports.report_maps import place_shapes
+from odscen.reports.report_sections import FEW
 from odscen.reports.report_signals import LightsOfRun
 from odscen.reports.run_report import render_report
 from odscen.runs import layout
@@ -57,6 +61,7 @@ if TYPE_CHECKING:
     from odscen.figures.by_place.traffic import TrafficFigures
     from odscen.figures.measures.figure import RunData
     from odscen.maps.store import Workspace
+    from odscen.reports.place_names import PlaceNames
 
 REPORT_ROWS = 2_000_000
 """Rows of trajectories that a report is made from at most; a day of a town has far more."""
@@ -120,11 +125,14 @@ def _render_page(
 
     recorded = read_trajectories(folder, most=REPORT_ROWS)
     sumo_map = None if loaded is None else loaded.sumo
+    chosen = corridor is not None
     if corridor is None and figures is not None and sumo_map is not None:
         corridor = busiest_corridor(over_run(figures.movements), sumo_map.graph)
     followed = None
     if corridor is not None and sumo_map is not None:
         followed = corridor_traces(folder, sumo_map, corridor)
+        if not chosen and not isinstance(followed, str) and followed.vehicles < FEW:
+            followed = None
     return render_report(
         summary,
         Plan.from_json(text(layout.PLAN_FILE)),
@@ -135,6 +143,7 @@ def _render_page(
         every=recorded.every if recorded is not None else 1,
         figures=figures,
         shapes=None if sumo_map is None else place_shapes(sumo_map.graph),
+        names=NO_NAMES if loaded is None else _map_names(loaded),
         corridor=followed,
         conflicts=read_conflicts(folder),
         lights=_read_lights(folder),
@@ -144,6 +153,11 @@ def _render_page(
         assignment=_read_assignment(folder),
         motion=motion,
     )
+
+
+@lru_cache(maxsize=4)
+def _map_names(loaded: LoadedMap) -> PlaceNames:
+    return place_names(loaded.sumo.graph, road_names(loaded.entry.read("xodr")))
 
 
 def _read_parking_use(folder: Path, summary: Mapping[str, Any]) -> ParkingUse | None:

@@ -19,7 +19,7 @@ from odscen.records.outcomes import ActorStatus, IncidentKind, StopReason, reaso
 from odscen.records.row_text import rounded
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from odscen.figures.measures.gridlock import Incident
     from odscen.figures.measures.summary import ActorOutcome
@@ -89,6 +89,39 @@ _PLACES = 5
 """Places that are named with a reason, at most."""
 
 
+def _format_seconds(seconds: float) -> str:
+    """``"4397 s"``."""
+    return f"{seconds:.0f} s"
+
+
+def _describe_spot(incident: Incident) -> str:
+    """``"r1-0 (x 12 m, y 40 m)"``."""
+    name = incident.place or incident.lane or incident.actor
+    if incident.x is None or incident.y is None:
+        return name
+    return f"{name} (x {incident.x:.0f} m, y {incident.y:.0f} m)"
+
+
+@dataclass(frozen=True, slots=True)
+class IncidentWords:
+    """How places and instants are written in the reasons of a verdict.
+
+    Attributes
+    ----------
+    spot
+        Where an incident was: its lane and coordinates, unless a reader has names of streets.
+    moment
+        An instant, given in seconds of the run.
+    """
+
+    spot: Callable[[Incident], str] = _describe_spot
+    moment: Callable[[float], str] = _format_seconds
+
+
+PLAIN = IncidentWords()
+"""Words without names of streets, and seconds of the run."""
+
+
 @dataclass(frozen=True, slots=True)
 class UsabilityReason:
     """One thing that is wrong.
@@ -147,6 +180,7 @@ def run_usability(
     end: float,
     until: float | None = None,
     scene: bool = False,
+    words: IncidentWords = PLAIN,
 ) -> Usability:
     """Judge a run that has ended.
 
@@ -164,14 +198,16 @@ def run_usability(
         Whether it is judged by its criteria: who stands before a pedestrian is no jam, and who has
         not arrived when the story ends is not late. Who was not inserted, or was teleported, has
         not done what the scene says.
+    words
+        How places and instants are written.
     """
     found = [
-        None if scene else _judge_gridlock(incidents, end),
-        _not_inserted(outcomes, incidents, end),
-        _judge_teleports(outcomes, incidents),
+        None if scene else _judge_gridlock(incidents, end, words),
+        _not_inserted(outcomes, incidents, end, words),
+        _judge_teleports(outcomes, incidents, words),
         None if scene else _not_served(outcomes, end),
         None if scene else _judge_latent_delay(outcomes, end),
-        None if until is None else _stopped_early(end, until),
+        None if until is None else _stopped_early(end, until, words),
     ]
     reasons = [
         reason
@@ -200,7 +236,9 @@ def usability_score(summary: Mapping[str, Any]) -> float | None:
     return None if not verdict else float(UsabilityLevel(verdict["level"]).score)
 
 
-def _judge_gridlock(incidents: Sequence[Incident], end: float) -> UsabilityReason | None:
+def _judge_gridlock(
+    incidents: Sequence[Incident], end: float, words: IncidentWords
+) -> UsabilityReason | None:
     jams = [incident for incident in incidents if incident.kind is IncidentKind.JAM]
     lasting = [jam for jam in jams if jam.until is None]
     circles = [jam for jam in jams if jam.reason is StopReason.CIRCLE]
@@ -219,21 +257,24 @@ def _judge_gridlock(incidents: Sequence[Incident], end: float) -> UsabilityReaso
         what = "gridlock that dissolved"
     number = f"{len(named)} times {what}" if len(named) > 1 else what
     first = named[0]
-    since = f"since {first.time:.0f} s ({reason_label(first.reason)})"
-    words = f"{number}, first at {_describe_spot(first)} {since}"
-    places = tuple(_describe_spot(incident) for incident in named[:_PLACES])
-    return UsabilityReason(UsabilityKind.GRIDLOCK, level, longest, len(named), words, places)
+    since = f"since {words.moment(first.time)} ({reason_label(first.reason)})"
+    text = f"{number}, first at {words.spot(first)} {since}"
+    places = tuple(words.spot(incident) for incident in named[:_PLACES])
+    return UsabilityReason(UsabilityKind.GRIDLOCK, level, longest, len(named), text, places)
 
 
 def _not_inserted(
-    outcomes: Sequence[ActorOutcome], incidents: Sequence[Incident], end: float
+    outcomes: Sequence[ActorOutcome],
+    incidents: Sequence[Incident],
+    end: float,
+    words: IncidentWords,
 ) -> UsabilityReason | None:
     expected = due(outcomes, end - PATIENCE)
     missing = [outcome for outcome in expected if outcome.status is ActorStatus.WAITING]
     kept = [incident for incident in incidents if incident.kind is IncidentKind.NOT_INSERTED]
     kept.sort(key=lambda incident: (-incident.count, incident.time))
-    places = tuple(f"{_describe_spot(incident)}: {incident.count}" for incident in kept[:_PLACES])
-    most = f", most at {_describe_spot(kept[0])} ({reason_label(kept[0].reason)})" if kept else ""
+    places = tuple(f"{words.spot(incident)}: {incident.count}" for incident in kept[:_PLACES])
+    most = f", most at {words.spot(kept[0])} ({reason_label(kept[0].reason)})" if kept else ""
     return _judge_share(
         UsabilityKind.NOT_INSERTED,
         len(missing),
@@ -245,15 +286,15 @@ def _not_inserted(
 
 
 def _judge_teleports(
-    outcomes: Sequence[ActorOutcome], incidents: Sequence[Incident]
+    outcomes: Sequence[ActorOutcome], incidents: Sequence[Incident], words: IncidentWords
 ) -> UsabilityReason | None:
     inserted = [outcome for outcome in outcomes if outcome.inserted is not None]
     gone = [outcome for outcome in inserted if outcome.teleports]
     where = [incident for incident in incidents if incident.kind is IncidentKind.TELEPORTED]
-    places = tuple(dict.fromkeys(_describe_spot(incident) for incident in where))[:_PLACES]
+    places = tuple(dict.fromkeys(words.spot(incident) for incident in where))[:_PLACES]
     first = f", first at {places[0]} ({reason_label(where[0].reason)})" if places else ""
-    words = f"inserted road users {_was_or_were(gone)} teleported"
-    return _judge_share(UsabilityKind.TELEPORTED, len(gone), len(inserted), words, first, places)
+    text = f"inserted road users {_was_or_were(gone)} teleported"
+    return _judge_share(UsabilityKind.TELEPORTED, len(gone), len(inserted), text, first, places)
 
 
 def _not_served(outcomes: Sequence[ActorOutcome], end: float) -> UsabilityReason | None:
@@ -298,18 +339,10 @@ def _judge_latent_delay(outcomes: Sequence[ActorOutcome], end: float) -> Usabili
     return UsabilityReason(UsabilityKind.LATENT_DELAY, level, value, late, words)
 
 
-def _stopped_early(end: float, until: float) -> UsabilityReason:
-    words = f"the run was stopped by hand at {end:.0f} s of {until:.0f} s"
+def _stopped_early(end: float, until: float, words: IncidentWords) -> UsabilityReason:
+    text = f"the run was stopped by hand at {words.moment(end)} of {words.moment(until)}"
     level = UsabilityLevel.RESERVATIONS
-    return UsabilityReason(UsabilityKind.STOPPED_EARLY, level, end, 0, words)
-
-
-def _describe_spot(incident: Incident) -> str:
-    """``"r1-0 (x 12 m, y 40 m)"``."""
-    name = incident.place or incident.lane or incident.actor
-    if incident.x is None or incident.y is None:
-        return name
-    return f"{name} (x {incident.x:.0f} m, y {incident.y:.0f} m)"
+    return UsabilityReason(UsabilityKind.STOPPED_EARLY, level, end, 0, text)
 
 
 def _was_or_were(some: Sequence[object]) -> str:

@@ -1,5 +1,28 @@
 "use strict";
 (() => {
+  const parts = [...document.querySelectorAll("details")];
+  const unfold = document.getElementById("unfold");
+  const openAll = () => parts.every((part) => part.open);
+  const label = () => {
+    if (unfold) unfold.textContent = openAll() ? "Fold all parts" : "Open all parts";
+  };
+  unfold?.addEventListener("click", () => {
+    const open = !openAll();
+    for (const part of parts) part.open = open;
+    label();
+  });
+  for (const part of parts) part.addEventListener("toggle", label);
+  const reveal = () => {
+    const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const part = target?.closest("details");
+    if (!part) return;
+    part.open = true;
+    target.scrollIntoView();
+  };
+  window.addEventListener("hashchange", reveal);
+  reveal();
+})();
+(() => {
   const table = document.getElementById("actors-table");
   if (!table) return;
   const body = table.tBodies[0];

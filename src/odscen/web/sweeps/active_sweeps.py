@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.atomic_folders import discard
 from odscen.base.checksums import check_files
 from odscen.base.errors import ConflictError, InputError, NotFoundError
+from odscen.experiments.ineffective import variables_without_effect
 from odscen.experiments.sweeps import (
     PAGE_FILE,
     PATIENCE,
@@ -82,6 +83,10 @@ class Sweeps:
             free=shutil.disk_usage(self._workspace.root).free,
             processes=processes,
             patience=PATIENCE,
+            without_effect=[
+                f"{name} has no effect: {reason}"
+                for name, reason in variables_without_effect(scenario, plan).items()
+            ],
         )
 
     def start(self, name: str, scenario: Scenario, wish: SweepWish) -> str:

@@ -83,7 +83,8 @@ class PlannedSweep(Answer):
     """How many cases a sweep has, and what they will take, from a trial of ``tried``.
 
     ``seconds`` is wall time of all cases, null if the one that was tried takes longer than
-    ``patience`` seconds; ``disk`` and ``free`` are bytes.
+    ``patience`` seconds; ``disk`` and ``free`` are bytes. ``without_effect`` has a sentence for
+    each varied parameter that changes nothing.
     """
 
     cases: int
@@ -94,6 +95,7 @@ class PlannedSweep(Answer):
     free: int
     processes: int
     patience: float
+    without_effect: list[str]
 
 
 class SweepInfo(Answer):
