@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.given_files import GivenPath
+    from odscen.formats.tracks.driver_fit import FittedDrivers
     from odscen.maps.map_entry import MapEntry
 
 
@@ -98,6 +99,28 @@ def show_recording(
         }
         draw_lines_on_map(entry, tracks, places, picture)
     return ShownRecording(summary, rows, scenes)
+
+
+def fit_recorded_drivers(recorded: RecordedTraffic, entry: MapEntry | None = None) -> FittedDrivers:
+    """Driver sets that drive as those of recorded traffic do.
+
+    Parameters
+    ----------
+    entry
+        The map in whose frame its places are, whose limits desired speeds are shares of; without
+        one they are not fitted.
+
+    Raises
+    ------
+    InputError
+        If nobody follows another vehicle for 10 s.
+    """
+    from odscen.formats.tracks.driver_fit import fit_drivers
+
+    if entry is None:
+        return fit_drivers(recorded.rows)
+    graph = entry.graph()
+    return fit_drivers(fit_on_map(recorded.rows, graph)[0], graph=graph)
 
 
 def read_recorded_traffic(

@@ -71,7 +71,7 @@ def find_scenes(placed: pl.DataFrame, graph: MapGraph | None = None) -> pl.DataF
         ``lane_change`` 1 to the left and -1 to the right, of ``cut_in`` the headway of ``other``,
         s, of ``crossing_pedestrian`` the time between it and the vehicle ``other``, s.
     """
-    rows = placed.filter(pl.col("category").is_not_null()).with_columns(_sizes_of_all())
+    rows = placed.filter(pl.col("category").is_not_null()).with_columns(known_sizes())
     vehicles = rows.filter(pl.col("category") != str(Category.PEDESTRIAN)).sort("id", "time")
     braking = vehicles.filter(pl.col("acceleration") <= -HARD_BRAKING)
     found = [
@@ -118,7 +118,7 @@ def exposure(rows: pl.DataFrame, scenes: pl.DataFrame) -> dict[str, Any]:
     }
 
 
-def _sizes_of_all() -> list[pl.Expr]:
+def known_sizes() -> list[pl.Expr]:
     """Length and width, those usual for its category where the file has none."""
     category = pl.col("category").cast(pl.String)
     return [
