@@ -15,12 +15,23 @@ from odscen.scenario.templates.template_registry import TEMPLATES
 
 MAPS = Path(__file__).parents[2] / "maps"
 ROOM = {
-    "town_5x5": {"hidden-child", "mid-block", "red-light"},
-    "motorway_weave": {"cut-in", "lead-brakes", "bus-leaves"},
-    "rural_hills": {"lead-brakes", "oncoming"},
-    "signal_crossing": {"lead-brakes", "hidden-child", "mid-block", "red-light"},
-    "left_hand_crossing": {"hidden-child", "mid-block", "red-light"},
-}
+    "town_5x5": {
+        "stationary", "bicycle-ahead", "hidden-child", "mid-block", "van-and-walker", "turning",
+        "reversing", "red-light",
+    },
+    "motorway_weave": {
+        "cut-in", "cut-out", "stationary", "lead-brakes", "bicycle-ahead", "drift", "bus-leaves",
+    },
+    "rural_hills": {"stationary", "lead-brakes", "bicycle-ahead", "oncoming"},
+    "signal_crossing": {
+        "stationary", "lead-brakes", "bicycle-ahead", "hidden-child", "mid-block",
+        "van-and-walker", "turning", "reversing", "red-light",
+    },
+    "left_hand_crossing": {
+        "stationary", "bicycle-ahead", "hidden-child", "mid-block", "turning", "reversing",
+        "red-light",
+    },
+}  # fmt: skip
 """Templates that each shipped map has room for."""
 
 

@@ -196,7 +196,7 @@ CHECKS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
-@pytest.mark.parametrize("name", TEMPLATES)
+@pytest.mark.parametrize("name", MAPS)
 def test_a_template_has_the_geometry_that_its_numbers_say(
     tmp_path: Path, name: str, step: float
 ) -> None:
@@ -205,7 +205,7 @@ def test_a_template_has_the_geometry_that_its_numbers_say(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TEMPLATES)
+@pytest.mark.parametrize("name", MAPS)
 def test_a_template_gives_the_same_bytes_twice(tmp_path: Path, name: str) -> None:
     scenario = scene(name)
     first, second = (told(prepared(scenario), tmp_path / one).folder for one in ("a", "b"))

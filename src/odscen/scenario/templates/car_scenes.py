@@ -19,6 +19,7 @@ from odscen.scenario.templates.scene_template import (
     beside,
     body_length,
     driven,
+    exact_start,
     kmh,
     metres_at,
     near_side,
@@ -141,12 +142,13 @@ def _lead_brakes(site: TemplateSite, values: Mapping[str, float]) -> TemplateSce
     metres = _REAR + ahead + speed * settle + speed**2 / (2.0 * rate) + length
 
     def place(stretch: LaneStretch) -> TemplateScene:
-        start, lead = (node_near(site, stretch, at) for at in (_REAR, _REAR + ahead))
+        start = node_near(site, stretch, _REAR)
+        lead, beyond = exact_start(site, stretch, metres_at(stretch, start) + ahead)
         last = int(stretch.nodes[-1])
         return TemplateScene(
             actors=(
                 vehicle(site, "ego", start, last, speed=speed, ego=True),
-                vehicle(site, "lead", lead, last, speed=speed),
+                vehicle(site, "lead", lead, last, speed=speed, longitudinal_offset=beyond),
             ),
             rules=(
                 driven("cruise", "lead", speed),

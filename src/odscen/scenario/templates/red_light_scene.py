@@ -96,7 +96,8 @@ def _at_light(
         actors=(
             vehicle(site, "ego", start, int(found.ego.nodes[-1]), speed=ego, moving=False,
                     ego=True),
-            vehicle(site, "runner", runner, int(found.runner.nodes[-1]), speed=fast, moving=False),
+            vehicle(site, "runner", runner, int(found.runner.nodes[-1]), speed=fast, moving=False,
+                    driver="story"),
         ),
         rules=(
             at_once("hold", "ego", {"stop": {}}),

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from odscen.scenario.templates.scene_sites import LaneStretches, RoadCrossing, WalkSides
 
 
+NO_COLLISION = "collided(ego) == 0"
+"""Criterion of scenes in which the ego is to avoid a collision."""
+
+
 class TemplateParameter(NamedTuple):
     """A number of a template; ``default`` ``None`` follows from the others, as ``meaning`` says."""
 
@@ -54,12 +58,15 @@ class TemplateScene:
         Of the run, s.
     wanted
         The geometry that follows from the parameters, in words with numbers.
+    criteria
+        What must come out of a run for it to pass, as in the document.
     """
 
     actors: tuple[dict[str, Any], ...]
     rules: tuple[dict[str, Any], ...]
     duration: float
     wanted: str
+    criteria: tuple[str, ...] = (NO_COLLISION,)
 
 
 @dataclass(frozen=True)
@@ -166,6 +173,18 @@ def node_near(site: TemplateSite, stretch: LaneStretch, along: float) -> int:
         if site.stretches.spawnable[stretch.nodes[place]]:
             return int(stretch.nodes[place])
     raise UnfitPlaceError("have no node for a vehicle where it is to start")
+
+
+def exact_start(site: TemplateSite, stretch: LaneStretch, along: float) -> tuple[int, float]:
+    """Node of a stretch, and metres from it to the place so many metres on.
+
+    Raises
+    ------
+    UnfitPlaceError
+        As for :func:`node_near`.
+    """
+    node = node_near(site, stretch, along)
+    return node, round(along - metres_at(stretch, node), 3)
 
 
 def metres_at(stretch: LaneStretch, node: int) -> float:

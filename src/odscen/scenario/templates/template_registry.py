@@ -11,11 +11,23 @@ from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.edits.settings_edits import new_scenario
 from odscen.scenario.placing.region import Region
 from odscen.scenario.templates.car_scenes import BUS_LEAVES, CUT_IN, LEAD_BRAKES
+from odscen.scenario.templates.impact_scenes import (
+    BICYCLE_AHEAD,
+    CUT_OUT,
+    DRIFT,
+    STATIONARY,
+)
 from odscen.scenario.templates.oncoming_scene import ONCOMING
 from odscen.scenario.templates.red_light_scene import RED_LIGHT
 from odscen.scenario.templates.scene_sites import LaneStretches, WalkSides
 from odscen.scenario.templates.scene_template import STEADY_DRIVER, TemplateSite
-from odscen.scenario.templates.walker_scenes import HIDDEN_CHILD, MID_BLOCK
+from odscen.scenario.templates.turning_scene import TURNING
+from odscen.scenario.templates.walker_scenes import (
+    HIDDEN_CHILD,
+    MID_BLOCK,
+    REVERSING,
+    VAN_AND_WALKER,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,7 +40,22 @@ if TYPE_CHECKING:
 
 TEMPLATES: dict[str, SceneTemplate] = {
     template.name: template
-    for template in (CUT_IN, LEAD_BRAKES, HIDDEN_CHILD, MID_BLOCK, RED_LIGHT, ONCOMING, BUS_LEAVES)
+    for template in (
+        CUT_IN,
+        CUT_OUT,
+        STATIONARY,
+        LEAD_BRAKES,
+        BICYCLE_AHEAD,
+        HIDDEN_CHILD,
+        MID_BLOCK,
+        VAN_AND_WALKER,
+        TURNING,
+        REVERSING,
+        DRIFT,
+        RED_LIGHT,
+        ONCOMING,
+        BUS_LEAVES,
+    )
 }
 """By name, in the order in which they are offered."""
 
@@ -82,5 +109,6 @@ def place_template(
     data = json.loads(dumps(new_scenario(graph, name=name, roi=roi, description=words)))
     data["drivers"] = {"sets": [STEADY_DRIVER]}
     data["actors"], data["rules"] = list(scene.actors), list(scene.rules)
+    data["criteria"] = list(scene.criteria)
     data["simulation"] = {"duration": scene.duration}
     return loads(json.dumps(data))

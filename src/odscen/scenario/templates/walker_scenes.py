@@ -8,15 +8,18 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.categories import Category
+from odscen.base.errors import InputError
 from odscen.scenario.templates.scene_sites import NoPlaceError, UnfitPlaceError, first_fit
 from odscen.scenario.templates.scene_template import (
     CHILD,
+    NO_COLLISION,
     SceneTemplate,
     TemplateParameter,
     TemplateScene,
     at_once,
     beside,
     body_length,
+    exact_start,
     kmh,
     metres_at,
     near_side,
@@ -87,7 +90,9 @@ def _crossing_scene(
         crossing = site.sides.crossing(stretch, along, near=near, beyond=beyond)
         if crossing.metres > reach:
             raise UnfitPlaceError(f"are more than {reach:.0f} m from the sidewalk")
-        distance = speed * crossing.metres / walking
+        # Its centre is to be at this share of the ego's width, from the side that it comes from.
+        walked = crossing.metres - (0.5 - values["hit"]) * site.usable.bodies[Category.CAR].width
+        distance = speed * walked / walking
         start = node_near(site, stretch, crossing.along - distance - lead_in)
         ego = vehicle(site, "ego", start, int(stretch.nodes[-1]), speed=speed, ego=True)
         actors = [ego, pedestrian(walker, crossing)]
@@ -114,7 +119,7 @@ def _crossing_scene(
                 f"Ego {kmh(speed)}, pedestrian {kmh(walking)}. The pedestrian starts when the "
                 f"ego's front is {distance:.2f} m away, so that both are at the place where "
                 f"their paths meet at one instant if the ego does not brake: the pedestrian "
-                f"would be hit at 50 % of the ego's width.{seen}"
+                f"would be hit at {values['hit'] * 100:.0f} % of the ego's width.{seen}"
             ),
         )
 
@@ -181,7 +186,11 @@ _SPEEDS = (
     ),
     TemplateParameter("walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian"),
     TemplateParameter("approach", 2, 0.5, 20, "s", "time before the pedestrian starts"),
-)
+    TemplateParameter(
+        "hit", 0.5, 0.1, 0.9, "",
+        "share of the ego's width, from the side of the pedestrian, at which it would be hit",
+    ),
+)  # fmt: skip
 
 HIDDEN_CHILD = SceneTemplate(
     name="hidden-child",
@@ -208,4 +217,194 @@ MID_BLOCK = SceneTemplate(
     needs="a sidewalk on either side of a road, away from crosswalks",
     parameters=_SPEEDS,
     place=_mid_block,
+)
+
+
+_FASTER = 1.5
+"""Speed that the van reaches in front of the ego, over that of the ego."""
+_AFTER_CUT_IN = 0.5
+"""Seconds from the end of the van's change of lanes to the start of the pedestrian, at least."""
+
+
+def _van_and_walker(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+    for reach in _REACHES:
+        try:
+            return _van_scene(site, values, reach)
+        except NoPlaceError as error:
+            refused = error
+    raise refused
+
+
+def _van_scene(site: TemplateSite, values: Mapping[str, float], reach: float) -> TemplateScene:
+    ego, van, over = values["ego_speed"], values["van_speed"], values["over"]
+    closing, distance = ego - van, values["distance"]
+    if closing < 1.0:
+        raise InputError(
+            f"ego_speed must be at least 1 m/s above van_speed ({van:g} m/s), not {ego:g} m/s"
+        )
+    length = body_length(site, Category.CAR)
+    halves = (length + body_length(site, Category.VAN)) / 2.0
+    ahead = halves + (values["ttc"] + values["approach"]) * closing
+    lead_in = length / 2.0 + ego * (values["approach"] + over + _AFTER_CUT_IN) + distance
+    metres = _REAR + max(lead_in, ahead) + _BEYOND
+
+    def place(stretch: LaneStretch) -> TemplateScene:
+        near = near_side(site, stretch)
+        lane = beside(site, stretch, -near)
+        crossing = site.sides.crossing(stretch, stretch.along[-1] - _BEYOND, near=near)
+        if crossing.metres > reach:
+            raise UnfitPlaceError(f"are more than {reach:.0f} m from the sidewalk")
+        start = node_near(site, stretch, crossing.along - lead_in)
+        first, beyond = exact_start(site, lane, metres_at(stretch, start) + ahead)
+        last = int(stretch.nodes[-1])
+        faster = {"speed": {"to": round(ego * _FASTER, 4), "rate": values["acceleration"]}}
+        change = {"lane": {"by": near, "over": over}}
+        far = {
+            "of": "ego", "place": list(crossing.meets), "along": "lane",
+            "below": round(distance, 3),
+        }  # fmt: skip
+        walk = {
+            "to": crossing.end, "through": [list(crossing.meets)],
+            "speed": round(values["walking_speed"], 4),
+        }  # fmt: skip
+        return TemplateScene(
+            actors=(
+                vehicle(site, "ego", start, last, speed=ego, ego=True),
+                vehicle(
+                    site, "van", first, int(lane.nodes[-1]), speed=van, category=Category.VAN,
+                    longitudinal_offset=beyond,
+                ),
+                pedestrian("walker", crossing),
+            ),
+            rules=(
+                at_once("wait", "walker", {"stop": {}}),
+                rule(
+                    "cut-in", "van", {"ttc": {"of": "ego", "to": "van", "below": values["ttc"]}},
+                    {"together": [change, faster]},
+                ),
+                rule("cross", "walker", {"distance": far}, {"walk": walk}),
+            ),
+            duration=math.ceil(values["approach"] + over + distance / ego + reach + 60.0),
+            wanted=(
+                f"Ego {kmh(ego)}, van {kmh(van)}. The van changes into the ego's lane at a time "
+                f"to collision of {values['ttc']:g} s, and drives on faster than the ego. The "
+                f"pedestrian, at {kmh(values['walking_speed'])}, begins to cross when the ego's "
+                f"front is {distance:g} m away, {crossing.metres:.2f} m from the middle of its "
+                f"lane."
+            ),
+            criteria=(NO_COLLISION, "stopped(ego) == 1", "min_distance(ego,walker) >= 0.5 m"),
+        )  # fmt: skip
+
+    found, why = site.stretches.of_length(metres, bend=_STRAIGHT)
+    what = "a van that cuts in and a pedestrian who crosses"
+    return first_fit(found, why, place, what=what, map_name=site.region.graph.map_name)
+
+
+VAN_AND_WALKER = SceneTemplate(
+    name="van-and-walker",
+    title="Cut-in, then a pedestrian",
+    summary="A van cuts in ahead of the ego, and then a pedestrian crosses between two junctions; "
+    "the ego is to stop before the pedestrian.",
+    source="No protocol: the numbers are odscen's choice.",
+    needs="two lanes of one direction, and a sidewalk on either side of the road",
+    parameters=(
+        TemplateParameter("ego_speed", 6, 2, 30, "m/s", "speed of the ego"),
+        TemplateParameter("van_speed", 3, 1, 28, "m/s", "speed of the van before it changes lanes"),
+        TemplateParameter(
+            "ttc", 3, 0.5, 10, "s", "time to collision with the van at which it changes lanes"
+        ),
+        TemplateParameter("over", 2, 1, 10, "s", "duration of the lane change"),
+        TemplateParameter("acceleration", 2, 0, 5, "m/s2", "of the van as it changes lanes"),
+        TemplateParameter(
+            "distance", 30, 2, 100, "m", "from the ego's front to the pedestrian who starts"
+        ),
+        TemplateParameter("walking_speed", 1, 0.5, 4, "m/s", "speed of the pedestrian"),
+        TemplateParameter("approach", 2, 0.5, 20, "s", "time before the van changes lanes"),
+    ),
+    place=_van_and_walker,
+)
+
+
+def _reversing(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+    for reach in _REACHES:
+        try:
+            return _reversing_scene(site, values, reach)
+        except NoPlaceError as error:
+            refused = error
+    raise refused
+
+
+def _reversing_scene(
+    site: TemplateSite, values: Mapping[str, float], reach: float
+) -> TemplateScene:
+    speed, walking = values["reversing_speed"], values["walking_speed"]
+    length = body_length(site, Category.CAR)
+    room = speed * reach / walking + length
+    metres = _BEYOND + room + length + _REAR
+
+    def place(stretch: LaneStretch) -> TemplateScene:
+        near = near_side(site, stretch)
+        crossing = site.sides.crossing(stretch, _BEYOND, near=near)
+        if crossing.metres > reach:
+            raise UnfitPlaceError(f"are more than {reach:.0f} m from the sidewalk")
+        seconds = crossing.metres / walking
+        node, offset = exact_start(site, stretch, crossing.along + speed * seconds + length / 2.0)
+        begin = _pose_on(site, node, offset)
+        back = speed * (seconds + values["beyond"])
+        end = _pose_on(site, node, offset - back)
+        rows = [[0.0, *begin], [round(seconds + values["beyond"], 4), *end]]
+        starts = {"time": {"after": values["approach"]}}
+        walk = {
+            "to": crossing.end, "through": [list(crossing.meets)], "speed": round(walking, 4),
+        }  # fmt: skip
+        ego = vehicle(
+            site, "ego", node, int(stretch.nodes[-1]), speed=CHILD, moving=False, ego=True,
+            longitudinal_offset=offset, driver="story",
+        )  # fmt: skip
+        return TemplateScene(
+            actors=(ego, pedestrian("walker", crossing)),
+            rules=(
+                at_once("wait", "walker", {"stop": {}}),
+                rule("reverse", "ego", starts, {"replay": {"rows": rows}}),
+                rule("cross", "walker", starts, {"walk": walk}),
+            ),
+            duration=math.ceil(values["approach"] + seconds + values["beyond"] + 60.0),
+            wanted=(
+                f"The ego reverses at {kmh(speed)}, a pedestrian crosses behind it at "
+                f"{kmh(walking)}. Both start after {values['approach']:g} s; after "
+                f"{seconds:.2f} s more the ego's rear is where the pedestrian is in the middle of "
+                f"its lane."
+            ),
+        )
+
+    found, why = site.stretches.of_length(metres, bend=_STRAIGHT)
+    what = "a vehicle that reverses"
+    return first_fit(found, why, place, what=what, map_name=site.region.graph.map_name)
+
+
+def _pose_on(site: TemplateSite, node: int, ahead: float) -> list[float]:
+    """X, y and heading so many metres ahead of a node on a straight lane."""
+    lanes = site.region.graph.lanes
+    hdg = float(lanes.hdg[node])
+    x = float(lanes.x[node]) + ahead * math.cos(hdg)
+    y = float(lanes.y[node]) + ahead * math.sin(hdg)
+    return [round(x, 4), round(y, 4), round(math.remainder(hdg, math.tau), 6)]
+
+
+REVERSING = SceneTemplate(
+    name="reversing",
+    title="Reversing",
+    summary="The ego reverses towards a pedestrian who crosses behind it.",
+    source="Euro NCAP AEB VRU, CPRA (reversing, adult): the ego at 4 or 8 km/h, the pedestrian at "
+    "5 km/h, hit at 50 % of the width.",
+    needs="a sidewalk on either side of a road, away from crosswalks",
+    parameters=(
+        TemplateParameter("reversing_speed", 4 / 3.6, 0.3, 6, "m/s", "speed of the ego"),
+        TemplateParameter("walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian"),
+        TemplateParameter("approach", 2, 0.5, 20, "s", "time before the pedestrian starts"),
+        TemplateParameter(
+            "beyond", 1, 0, 10, "s", "time that it reverses on behind the pedestrian's path"
+        ),
+    ),
+    place=_reversing,
 )

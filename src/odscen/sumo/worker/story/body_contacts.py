@@ -32,6 +32,9 @@ _RUNS = 10.0
 
 _HARDEST = 12.0
 """m/s²; a speed that changes more in a step has leapt, and not changed evenly."""
+_EDGE = 1e-4
+"""Metres added to bodies where the place of a contact is looked for: sides that are parallel but
+for rounding meet in their middle, and not at a corner."""
 _PIECE = 0.1
 """Seconds between looks within a step: in longer ones bodies pass through one another."""
 
@@ -283,7 +286,8 @@ def _touching_point(one: ActorView, other: ActorView) -> tuple[float, float]:
     """Middle of where two bodies overlap."""
     from shapely import Polygon
 
-    shared = Polygon(one.corners).intersection(Polygon(other.corners))
+    bodies = [Polygon(body.corners).buffer(_EDGE, join_style="mitre") for body in (one, other)]
+    shared = bodies[0].intersection(bodies[1])
     middle = shared.centroid
     if middle.is_empty:
         return (one.x + other.x) / 2.0, (one.y + other.y) / 2.0
