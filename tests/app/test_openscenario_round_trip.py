@@ -95,10 +95,26 @@ def test_a_template_comes_back_but_for_what_the_export_lists(
 @pytest.mark.parametrize("template", ["cut-in", "bus-leaves", "lead-brakes"])
 def test_a_scene_that_openscenario_can_say_comes_back_whole(template: str, tmp_path: Path) -> None:
     entry(PLACES[template])
-    before = template_scenario(workspace(), template, PLACES[template])
+    judged = template_scenario(workspace(), template, PLACES[template])
+    assert there_and_back(judged, tmp_path / "judged", "1.2")[1]["left_out"] == [
+        {"place": "criteria", "reason": "OpenSCENARIO has no word for it"}
+    ]
+    before = judged.model_copy(update={"criteria": ()})
     after, notes = there_and_back(before, tmp_path, "1.2")
     assert notes == {"approximated": [], "left_out": []}
     assert acting_differences(before, after) == ()
+
+
+@pytest.mark.parametrize("after_story", ["auto", "never", 2.5])
+def test_how_long_a_run_goes_on_after_its_story_comes_back(
+    after_story: float | str, tmp_path: Path
+) -> None:
+    entry("motorway_weave")
+    scenario = template_scenario(workspace(), "cut-in", "motorway_weave")
+    simulation = scenario.simulation.model_copy(update={"after_story": after_story})
+    before = scenario.model_copy(update={"simulation": simulation})
+    after, _ = there_and_back(before, tmp_path, "1.2")
+    assert after.simulation.after_story == after_story
 
 
 def test_bodies_exact_starts_and_headways_ahead_come_back(tmp_path: Path) -> None:
@@ -219,7 +235,9 @@ def test_what_is_changed_in_the_file_holds_and_not_the_property(tmp_path: Path) 
     tree.write(file)
     after = import_file(workspace(), file).scenario
     changed = {one.place: one.after for one in acting_differences(before, after)}
-    assert changed.keys() == {("actors", "ego", "spawn"), ("actors", "ego", "initial_speed")}
+    assert changed.keys() == {
+        ("actors", "ego", "spawn"), ("actors", "ego", "initial_speed"), ("criteria",)
+    }  # fmt: skip
     assert changed["actors", "ego", "initial_speed"] == "12.5"
 
 

@@ -1831,6 +1831,8 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "{early} rows" }),
   msg({ message: "{edges} put in between {before} and {edge}" }),
   msg({ message: "{end}, of the act" }),
+  msg({ message: "{end}, or {after_story} s after its story" }),
+  msg({ message: "{end}, whatever is left to happen" }),
   msg({ message: "{error} is not there any more; it was removed or is damaged" }),
   msg({ message: "{exact_name} is in group {other} already; a movement has one light" }),
   msg({ message: "{field_type} should have at least {min_length} item after validation, not {actual_length}" }),

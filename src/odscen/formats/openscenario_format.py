@@ -180,6 +180,7 @@ def _note_traffic(source: ExportSource, dialect: Dialect, notes: ExportNotes) ->
         "flows": bool(scenario.flows),
         "demand": bool(scenario.demand.parts),
         "transit": bool(scenario.transit.lines),
+        "criteria": bool(scenario.criteria),
         "measures": bool(scenario.measures),
         "signals": bool(scenario.signals.model_dump(exclude_defaults=True)),
     }

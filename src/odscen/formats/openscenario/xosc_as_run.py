@@ -15,6 +15,7 @@ from odscen.formats.openscenario.xosc_places import GroundPose, reference_behind
 from odscen.formats.openscenario.xosc_presence import add_entity, delete_entity, private
 from odscen.formats.openscenario.xosc_signals import light_action
 from odscen.formats.openscenario.xosc_storyboard import act, event, maneuver_group
+from odscen.formats.openscenario.xosc_triggers import name_of_end
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -67,7 +68,7 @@ class AsRun:
         until, sky = self.recorded.until, self.environment
         whole = act("as run", groups, self.triggers, until=until, sky=sky)
         name = self.source.scenario.name
-        end = self.triggers.at_time(until, "end of the run")
+        end = self.triggers.at_time(until, name_of_end("never"))
         return xml(
             "Storyboard",
             xml("Init", xml("Actions", *self._write_init(states))),

@@ -19,7 +19,12 @@ from odscen.formats.openscenario.xosc_presence import (
     private,
     speed_action,
 )
-from odscen.formats.openscenario.xosc_triggers import CannotSayError, Triggers
+from odscen.formats.openscenario.xosc_triggers import (
+    END,
+    CannotSayError,
+    Triggers,
+    name_of_end,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -34,7 +39,6 @@ if TYPE_CHECKING:
 
 _LONGEST: Final = 300.0
 """Seconds after which ScenarioRunner stops a scenario: the default in its class OpenScenario."""
-_END: Final = "end of the run"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,7 @@ class Story:
         groups, ends = groups + rules, self._write_run_ends(events)
         duration = self.scenario.simulation.duration
         triggers = Triggers(self.places, self.dialect, self.notes, {})
+        end = name_of_end(self.scenario.simulation.after_story)
         return xml(
             "Storyboard",
             xml("Init", xml("Actions", *self._write_init(self.scenario.actors))),
@@ -69,7 +74,11 @@ class Story:
                 act("rules", groups, triggers, until=duration, ends=ends, sky=self.environment),
                 name=self.scenario.name,
             ),
-            xml("StopTrigger", triggers.at_time(duration, _END), *ends),
+            xml(
+                "StopTrigger",
+                triggers.at_time(duration, end),
+                *ends,
+            ),
         )
 
     def _write_init(self, actors: Sequence[Actor]) -> Iterable[_Element]:
@@ -230,12 +239,12 @@ def act(
         if until > _LONGEST:
             words = f"ScenarioRunner stops after {_LONGEST:g} s"
             triggers.notes.approximated.append(("simulation.duration", words))
-        end = xml("StartTrigger", triggers.at_time(until, _END))
+        end = xml("StartTrigger", triggers.at_time(until, END))
         weather = xml("GlobalAction", xml("EnvironmentAction", deepcopy(sky)))
-        last = event(f"weather at the {_END}", [weather], end, 1)
-        groups = [*groups, maneuver_group(_END, None, [last])]
+        last = event(f"weather at the {END}", [weather], end, 1)
+        groups = [*groups, maneuver_group(END, None, [last])]
         early = deepcopy(list(ends))
-        stop = xml("StopTrigger", triggers.at_time(until, f"{_END}, of the act"), *early)
+        stop = xml("StopTrigger", triggers.at_time(until, f"{END}, of the act"), *early)
     if not groups:  # a story needs one
         nobody = xml("Actors", selectTriggeringEntities=False)
         groups = [xml("ManeuverGroup", nobody, name="none", maximumExecutionCount=1)]

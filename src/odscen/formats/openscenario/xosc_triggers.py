@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.formats.openscenario.dialect import xml
 from odscen.formats.openscenario.xosc_signals import lamps_of, movement_of, signal_of
+from odscen.scenario.document.scenario_document import LONGEST_AFTER_STORY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from odscen.formats.openscenario.dialect import Dialect
     from odscen.formats.openscenario.xosc_places import Places
     from odscen.scenario.document.rules_document import Condition
+    from odscen.scenario.document.scenario_document import AfterStory
 
 _SAME: Final = 1e-6
 MOST_GROUPS: Final = 64
@@ -50,6 +53,34 @@ class Leaf:
     state: str = ""
     name: str = ""
     equal: float | None = None
+
+
+END: Final = "end of the run"
+"""Name of the condition that ends a run; what follows says how long it goes on after its story."""
+_WHATEVER: Final = f"{END}, whatever is left to happen"
+_SETTLED: Final = re.compile(rf"{END}, or (\S+) s after its story")
+
+
+def name_of_end(after_story: AfterStory) -> str:
+    """Name of the condition that ends a run, which says what the standard has no element for."""
+    if after_story == "auto":
+        return END
+    return _WHATEVER if after_story == "never" else f"{END}, or {after_story:g} s after its story"
+
+
+def after_story_of(name: str) -> AfterStory:
+    """How long a run goes on after its story, by the name of the condition that ends it.
+
+    A file of others that names a time runs until then.
+    """
+    if name == END:
+        return "auto"
+    found = _SETTLED.fullmatch(name)
+    try:
+        seconds = -1.0 if found is None else float(found[1])
+    except ValueError:
+        seconds = -1.0
+    return seconds if 0.0 <= seconds <= LONGEST_AFTER_STORY else "never"
 
 
 @dataclass(frozen=True, slots=True)

@@ -584,7 +584,9 @@ class Demand(Part):
 
 AFTER_STORY = 10.0
 """Seconds for which a scene goes on after its story has ended."""
-AfterStory = Annotated[float, Field(ge=0, le=1e6)] | Literal["auto", "never"]
+LONGEST_AFTER_STORY = 1e6
+"""Seconds."""
+AfterStory = Annotated[float, Field(ge=0, le=LONGEST_AFTER_STORY)] | Literal["auto", "never"]
 
 
 class Simulation(Part):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.errors import InputError
+from odscen.formats.openscenario.xosc_triggers import after_story_of
 from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.story.read_conditions import ALWAYS, NEVER
 
@@ -27,24 +28,24 @@ def read_stop(report: ImportReport, board: _Element, story: StoryReader) -> Made
     A file that names a time runs until then, whether or not anything is left to happen.
     """
     stop = report.child(board, "StopTrigger")
-    found, latest, ends = [], 0.0, False
+    found: list[tuple[float, str]] = []
+    latest, ends = 0.0, False
     for group in () if stop is None else report.children(stop, "ConditionGroup"):
         times = group.findall(".//SimulationTimeCondition")
         seconds = [report.number(time, "value") for time in times]
         if times and len(times) == len(group.findall("Condition")):
-            _take_stop_time(report, times, board)
-            found.append(min(seconds))
+            found.append(_take_stop_time(report, times, board))
         elif story.actions is not None and (
             when := _stop_condition(report, group, story.actions.conditions)
         ):
             story.end(when)
             latest, ends = max([latest, *seconds]), True
         elif times:
-            _take_stop_time(report, times, board)
-            found.append(min(seconds))
+            found.append(_take_stop_time(report, times, board))
             report.mark(group, "approximated", "the run ends by time alone")
-    if found := [time for time in found if time > 0]:
-        return {"duration": min(found), "after_story": "never"}
+    if found := [end for end in found if end[0] > 0]:
+        duration, name = min(found)
+        return {"duration": duration, "after_story": after_story_of(name)}
     duration = _USUAL_DURATION + latest
     if stop is not None:
         words = f"the run ends after {duration:g} s{' at the latest' if ends else ''}"
@@ -70,9 +71,16 @@ def _stop_condition(
     return None if when in ({}, ALWAYS, NEVER) else when
 
 
-def _take_stop_time(report: ImportReport, times: list[_Element], board: _Element) -> None:
+def _take_stop_time(
+    report: ImportReport, times: list[_Element], board: _Element
+) -> tuple[float, str]:
+    """The earliest of these times, and the name of its condition."""
+    found = []
     for condition in times:
         above: _Element | None = condition
         while above is not None and above is not board:
             report.mark(above, "taken")
+            if above.tag == "Condition":
+                found.append((report.number(condition, "value"), above.get("name", "")))
             above = above.getparent()
+    return min(found)
