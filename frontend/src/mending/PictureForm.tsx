@@ -115,7 +115,7 @@ export function PictureForm({
             size="xs"
             label={t`Coordinate system of the world file`}
             description={t`Empty: metres of the map`}
-            placeholder="EPSG:25832"
+            placeholder={t`EPSG:25832`}
             value={crs}
             onChange={({ currentTarget: { value } }) => setCrs(value)}
           />
