@@ -40,7 +40,7 @@ def test_a_template_is_placed_by_keyboard_and_says_why_it_has_no_room(
     user = open_page(served.url)
     user.open_catalogue()
     page = user.page
-    page.get_by_role("button", name="Place on a map: Cut-in").focus()
+    page.get_by_role("button", name="Place on a map: Cut-in", exact=True).focus()
     page.keyboard.press("Enter")
     dialog = page.get_by_role("dialog", name="Cut-in")
     expect(dialog).to_be_visible()

@@ -41,7 +41,7 @@ def test_a_picture_is_laid_under_a_map_shown_and_taken_away(client: TestClient) 
     points = json.dumps([[0, 0, -50, 25], [200, 0, 50, 25]])
     placed = client.post(URL, files={"file": ("q.png", picture())}, data={"points": points}).json()
     assert placed["affine"] == pytest.approx([0.5, 0, -50, 0, -0.5, 25])
-    assert client.delete(URL).status_code == 200
+    assert client.delete(URL).status_code == 204
     assert client.get(URL).json() is None
 
 

@@ -6251,10 +6251,7 @@ export interface operations {
         };
         responses: {
             /** @description Successful Response */
-            200: {
-                content: {
-                    "application/json": unknown;
-                };
+            204: {
             };
             default: components["responses"]["Error"];
         };

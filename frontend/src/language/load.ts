@@ -2,7 +2,7 @@ import { i18n, type Messages } from "@lingui/core";
 import { compileMessage } from "@lingui/message-utils/compileMessage";
 
 import { type Language, LANGUAGES, usePreferences } from "./preferences";
-import { serveSentences } from "./served";
+import { serveSentences, serveTexts } from "./served";
 
 /** The catalogues, each loaded when its language is first chosen; English texts come with the code. */
 const CATALOGUES: Record<Language, () => Promise<{ messages: Messages }>> = {
@@ -53,8 +53,13 @@ async function speak(language: Language): Promise<void> {
 async function speakForServer(language: Language): Promise<void> {
   const load = SENTENCES[language];
   if (!load) return;
-  const [{ messages }, { translated }] = await Promise.all([load(), import("./sentences")]);
+  const [{ messages }, { translated }, { SERVER_TEXTS }] = await Promise.all([
+    load(),
+    import("./sentences"),
+    import("./serverTexts"),
+  ]);
   if (usePreferences.getState().language !== language) return;
+  serveTexts(SERVER_TEXTS);
   serveSentences(translated);
   i18n.load(language, messages);
 }

@@ -1,6 +1,14 @@
-import { i18n } from "@lingui/core";
+import { i18n, type MessageDescriptor } from "@lingui/core";
 
-import { SERVER_TEXTS } from "./serverTexts";
+type Texts = Readonly<Record<string, MessageDescriptor>>;
+
+/** What the server says in whole texts; none where the reader reads English. */
+let texts: Texts = {};
+
+/** Sets the texts that {@link served} knows. */
+export const serveTexts = (known: Texts): void => {
+  texts = known;
+};
 
 /** What finds sentences of the server and their place in the catalogue; none where the reader reads English. */
 let sentences: ((text: string) => string) | null = null;
@@ -12,6 +20,6 @@ export const serveSentences = (translated: ((text: string) => string) | null): v
 
 /** A text of the server in the language of the reader; one that is not known stays as it is. */
 export function served(text: string): string {
-  const known = SERVER_TEXTS[text];
+  const known = texts[text];
   return known ? i18n._(known) : (sentences?.(text) ?? text);
 }

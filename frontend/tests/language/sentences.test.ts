@@ -6,8 +6,9 @@ import { compileMessage } from "@lingui/message-utils/compileMessage";
 import { afterAll, beforeAll, expect, test } from "vitest";
 
 import { partsOf, translated } from "../../src/language/sentences";
-import { served, serveSentences } from "../../src/language/served";
+import { served, serveSentences, serveTexts } from "../../src/language/served";
 import { SERVER_SENTENCES } from "../../src/language/serverSentences";
+import { SERVER_TEXTS } from "../../src/language/serverTexts";
 import { messages as page } from "../../src/locales/de.po";
 import { messages as server } from "../../src/locales/server/de.po";
 
@@ -102,6 +103,7 @@ test.each([
 
 test("a text of the server is looked up in the lists first, then among the sentences", () => {
   expect(served("there is nothing to undo")).toBe("there is nothing to undo");
+  serveTexts(SERVER_TEXTS);
   serveSentences(translated);
   expect(served("there is nothing to undo")).toBe("es gibt nichts rückgängig zu machen");
   expect(served("Cut-in")).toBe("Einscheren");

@@ -77,7 +77,7 @@ def set_background(
     return _describe_background(found)
 
 
-@router.delete("")
+@router.delete("", status_code=204)
 def remove_background(name: str, shared: Shared) -> None:
     """Take the picture under a map away."""
     shared.workspace.remove_background(name)
