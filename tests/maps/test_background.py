@@ -15,7 +15,13 @@ from hypothesis import strategies as st
 from PIL import Image, TiffImagePlugin
 
 from odscen.base.errors import InputError
-from odscen.maps.background import PicturePoint, _apply, fit_points, parse_world_file, place_picture
+from odscen.maps.background import (
+    PicturePoint,
+    _place_pixels,
+    fit_points,
+    parse_world_file,
+    place_picture,
+)
 from odscen.opendrive.parse import parse
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -41,7 +47,7 @@ def geotiff(*, epsg: int | None, x: float, y: float, size: float, point: bool = 
 
 
 def places(affine: tuple[float, ...], *pixels: tuple[float, float]) -> list[tuple[float, float]]:
-    x, y = _apply(affine, np.array(pixels, dtype=float))  # type: ignore[arg-type]
+    x, y = _place_pixels(affine, np.array(pixels, dtype=float))  # type: ignore[arg-type]
     return list(zip(x.tolist(), y.tolist(), strict=True))
 
 

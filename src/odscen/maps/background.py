@@ -96,7 +96,7 @@ class Background:
 
     def bounds(self) -> Bounds:
         """Least and largest x and y, m."""
-        x, y = _apply(self.affine, _corners(self.width, self.height))
+        x, y = _place_pixels(self.affine, _find_corners(self.width, self.height))
         return float(x.min()), float(y.min()), float(x.max()), float(y.max())
 
 
@@ -133,7 +133,7 @@ def parse_world_file(text: str) -> Affine:
         a, d, b, e, c, f = (float(word) for word in words)
     except ValueError:
         raise InputError(f"a world file has six numbers, not {' '.join(words)[:60]!r}") from None
-    return _checked((a, b, c - (a + b) / 2, d, e, f - (d + e) / 2))
+    return _refuse_flat((a, b, c - (a + b) / 2, d, e, f - (d + e) / 2))
 
 
 def fit_points(points: Sequence[PicturePoint]) -> Affine:
@@ -158,7 +158,7 @@ def fit_points(points: Sequence[PicturePoint]) -> Affine:
         raise InputError("the points of a picture must be at different places")
     turn = complex((spread.conj() @ (here - here.mean())) / (spread.conj() @ spread))
     move = complex(here.mean() - turn * there.mean())
-    return _checked((turn.real, turn.imag, move.real, turn.imag, -turn.real, move.imag))
+    return _refuse_flat((turn.real, turn.imag, move.real, turn.imag, -turn.real, move.imag))
 
 
 def place_picture(
@@ -201,7 +201,7 @@ def place_picture(
     MissingDependencyError
         Of a TIFF, if Pillow is not installed.
     """
-    decoded = _decode(content)
+    decoded = _decode_picture(content)
     if points:
         affine = fit_points(points)
     elif world is not None:
@@ -276,14 +276,14 @@ def read_background(folder: Path) -> Background | None:
             str(told["source"]),
             media,
             *_checked_size(int(told["width"]), int(told["height"])),
-            _checked((a, b, c, d, e, f)),
+            _refuse_flat((a, b, c, d, e, f)),
         )
 
 
 # --------------------------------------------------------------------------------- the picture
 
 
-def _decode(content: bytes) -> _Decoded:
+def _decode_picture(content: bytes) -> _Decoded:
     if len(content) > MOST_BYTES:
         raise InputError(
             f"a picture may have {MOST_BYTES >> 20} MB, this one has {len(content) >> 20}"
@@ -375,26 +375,26 @@ def _read_geotiff_tags(tags: dict[int, object]) -> tuple[Affine | None, str | No
         a, b, c, d, e, f = affine
         affine = (a, b, c - (a + b) / 2, d, e, f - (d + e) / 2)
     code = found.get(3072) or found.get(2048)
-    return _checked(affine), f"EPSG:{code}" if code and code < 32_767 else None
+    return _refuse_flat(affine), f"EPSG:{code}" if code and code < 32_767 else None
 
 
 # ----------------------------------------------------------------------------------- its place
 
 
-def _checked(affine: Affine) -> Affine:
+def _refuse_flat(affine: Affine) -> Affine:
     a, b, _, d, e, _ = affine
     if not all(map(math.isfinite, affine)) or abs(a * e - b * d) < 1e-16:
         raise InputError("the numbers that place the picture do not span a plane")
     return affine
 
 
-def _corners(width: int, height: int) -> FloatArray:
+def _find_corners(width: int, height: int) -> FloatArray:
     """Corners and middle of a picture, (5, 2): column and row."""
     w, h = float(width), float(height)
     return np.array([(0.0, 0.0), (w, 0.0), (w, h), (0.0, h), (w / 2, h / 2)])
 
 
-def _apply(affine: Affine, pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _place_pixels(affine: Affine, pixels: FloatArray) -> tuple[FloatArray, FloatArray]:
     a, b, c, d, e, f = affine
     column, row = pixels[:, 0], pixels[:, 1]
     return a * column + b * row + c, d * column + e * row + f
@@ -405,8 +405,8 @@ def _onto_map(affine: Affine, crs: str | None, header: Header, picture: _Decoded
     if crs is None:
         return affine
     convert = _to_map_metres(crs, header)
-    pixels = _corners(picture.width, picture.height)
-    x, y = convert(*_apply(affine, pixels))
+    pixels = _find_corners(picture.width, picture.height)
+    x, y = convert(*_place_pixels(affine, pixels))
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
         raise InputError(f"the picture lies where {crs} cannot be carried over to the map")
     terms = np.column_stack((pixels, np.ones(len(pixels))))
@@ -418,7 +418,7 @@ def _onto_map(affine: Affine, crs: str | None, header: Header, picture: _Decoded
             "save it in the map's projection"
         )
     (a, d), (b, e), (c, f) = fitted.tolist()
-    return _checked((a, b, c, d, e, f))
+    return _refuse_flat((a, b, c, d, e, f))
 
 
 def _to_map_metres(

@@ -122,7 +122,7 @@ class Wastebasket:
             item.folder.mkdir(parents=True)
             place.rename(item.content)
             if kind in _COMPANIONS:
-                _move_folder(self._companion(kind, name), item.folder / _COMPANIONS[kind])
+                _move_folder(self._find_companion(kind, name), item.folder / _COMPANIONS[kind])
         self.sweep()
         return item
 
@@ -179,7 +179,7 @@ class Wastebasket:
             )
         with disk_errors(f"{item.kind} {item.name!r}"):
             if item.kind in _COMPANIONS:
-                companion = self._companion(item.kind, item.name)
+                companion = self._find_companion(item.kind, item.name)
                 with suppress(FileNotFoundError):  # of a namesake that is gone
                     discard(companion)
                 _move_folder(item.folder / _COMPANIONS[item.kind], companion)
@@ -215,7 +215,7 @@ class Wastebasket:
         ending = SCENARIO_SUFFIX if kind == "scenario" else ""
         return self._folders[kind] / (check_name(name, what=kind) + ending)
 
-    def _companion(self, kind: RemovedKind, name: str) -> Path:
+    def _find_companion(self, kind: RemovedKind, name: str) -> Path:
         return self._folders[kind] / _COMPANIONS[kind] / name
 
 
