@@ -139,7 +139,10 @@ def sarif(result: SuiteResult) -> str:
         path = _relative(finding.file)
         known = f"{result.suite.name}\n{path}\n{finding.title}\n{finding.words}"
         digest = hashlib.sha256(known.encode()).hexdigest()
-        place = {"artifactLocation": {"uri": _uri(path)}, "region": {"startLine": finding.line}}
+        place = {
+            "artifactLocation": {"uri": _quote_path(path)},
+            "region": {"startLine": finding.line},
+        }
         rows.append(
             {
                 "ruleId": "odscen-test",
@@ -163,7 +166,7 @@ def sarif(result: SuiteResult) -> str:
     return json.dumps(log, indent=1, ensure_ascii=False) + "\n"
 
 
-def _uri(path: str) -> str:
+def _quote_path(path: str) -> str:
     """Reference to a file: relative to the repository, or absolute outside it."""
     return Path(path).as_uri() if path.startswith("/") else quote(path)
 

@@ -62,7 +62,7 @@ def _find_reason(scenario: Scenario, name: str, values: list[float]) -> str | No
     places = sorted(place for place in used if not place.startswith("parameters/"))
     if not places:
         return "no number of the scenario is computed from it"
-    cases = list(_cases(scenario, name, values))
+    cases = list(_make_cases(scenario, name, values))
     if not cases:
         return None
     if len(values) > 1 and all(_is_constant(place, scenario, cases) for place in places):
@@ -89,7 +89,7 @@ def _computed_from(formulas: Mapping[str, str], name: str) -> set[str]:
         names |= {part[1] for part in parts if part[0] == "parameters"}
 
 
-def _cases(scenario: Scenario, name: str, values: list[float]) -> Iterator[Scenario]:
+def _make_cases(scenario: Scenario, name: str, values: list[float]) -> Iterator[Scenario]:
     """The scenario with each value that is possible; a sweep refuses the others."""
     for value in dict.fromkeys(values):
         try:

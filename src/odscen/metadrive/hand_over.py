@@ -173,7 +173,7 @@ class _Paths:
             ahead = np.array([np.cos(tracks.hdg[rows[0]]), np.sin(tracks.hdg[rows[0]])])
             xy = np.concatenate([xy, xy + 0.1 * ahead])
             rows = np.repeat(rows, 2)
-        limit = self._limits(xy, tracks.hdg[rows]) * actor.speed_factor
+        limit = self._find_limits(xy, tracks.hdg[rows]) * actor.speed_factor
         if actor.speed is not None:
             limit = np.minimum(limit, actor.speed)
         self._parts.append((xy, tracks.when[rows], speed_along(xy, limit)))
@@ -189,7 +189,7 @@ class _Paths:
             "path_speed": np.concatenate([np.empty(0), *(speed for _, _, speed in parts)]),
         }
 
-    def _limits(self, xy: FloatArray, hdg: FloatArray) -> FloatArray:
+    def _find_limits(self, xy: FloatArray, hdg: FloatArray) -> FloatArray:
         """Speed limit at each place: of the nearest node that runs the same way."""
         graph = self._graph
         _, near = self._tree.query(xy, k=min(8, len(graph.x)))

@@ -85,14 +85,14 @@ class World:
             if index < len(start) - 1:
                 for at in range(int(start[index]), int(start[index + 1])):
                     recorded[int(self._arrays["row"][at])] = at
-            touched = self._advance(index, before, recorded) if index else []
-            self._show(recorded)
+            touched = self._advance_body(index, before, recorded) if index else []
+            self._show_recorded(recorded)
             yield self._take_down(index, touched)
             if index >= len(start) - 2 and not self._drivers:
                 return
             before = recorded
 
-    def _advance(
+    def _advance_body(
         self, index: int, before: dict[int, int], recorded: dict[int, int]
     ) -> list[list[int]]:
         """Make a step: drivers act, MetaDrive's physics moves, and the replayed go on."""
@@ -108,20 +108,20 @@ class World:
             share = (decision + 1) / self._decisions
             for row in sorted(self._bodies):
                 if row not in self._drivers and row in before and row in recorded:
-                    self._put(row, before[row], recorded[row], share)
+                    self._place_body(row, before[row], recorded[row], share)
             touched |= {(row, other) for row in self._drivers for other in self._find_contacts(row)}
         for row in sorted(self._drivers):
             driver = self._drivers[row]
             if row not in recorded if driver.timed else driver.arrived(self._bodies[row]):
-                self._remove(row)
+                self._remove_body(row)
         return [list(pair) for pair in sorted(touched)]
 
-    def _show(self, recorded: dict[int, int]) -> None:
+    def _show_recorded(self, recorded: dict[int, int]) -> None:
         """Put the replayed where they were recorded; those who are new come in."""
         for row in [
             row for row in self._bodies if row not in recorded and row not in self._drivers
         ]:
-            self._remove(row)
+            self._remove_body(row)
         for row, at in recorded.items():
             if row in self._gone:
                 continue
@@ -186,14 +186,14 @@ class World:
         drive = user["drive"]
         if drive == "replay":
             body.set_static(True)
-            self._put(row, at, at, 1.0)
+            self._place_body(row, at, at, 1.0)
             return
         first, last = (int(arrays["path_start"][user["path"] + k]) for k in (0, 1))
         path = Way(*(arrays[name][first:last] for name in ("path_xy", "path_time", "path_speed")))
         driver = Tracker if drive == "tracking" else Follower
         self._drivers[row] = driver(body, path, self._job["seed"], user["arrives"])
 
-    def _put(self, row: int, start: int, end: int, share: float) -> None:
+    def _place_body(self, row: int, start: int, end: int, share: float) -> None:
         """Put one who is replayed between two of its recorded states."""
         body, arrays = self._bodies[row], self._arrays
         x, y, speed = (
@@ -207,7 +207,7 @@ class World:
         body.set_heading_theta(hdg)
         body.set_velocity([speed * math.cos(hdg), speed * math.sin(hdg)])
 
-    def _remove(self, row: int) -> None:
+    def _remove_body(self, row: int) -> None:
         body = self._bodies.pop(row)
         self._drivers.pop(row, None)
         self._gone.add(row)
@@ -351,7 +351,7 @@ class Tracker:
         at, soon, then = (float(np.interp(when, path.time, path.along)) for when in whens)
         wanted, gain = (soon - at) / step, (then - 2.0 * soon + at) / step**2
         gone, speed = path.gone(body), float(body.speed)
-        steering = self._steer(body, gone, speed)
+        steering = self._steer_body(body, gone, speed)
         if wanted < STANDING and at - gone < CLOSE:
             return [steering, -1.0]
         # a = a_recorded + 3/s (v_recorded - v) + 2/s^2 (s_recorded - s)
@@ -359,7 +359,7 @@ class Tracker:
         pedals = gain / (FULL_THROTTLE if gain > 0.0 else FULL_BRAKE)
         return [steering, float(np.clip(pedals, -1.0, 1.0))]
 
-    def _steer(self, body: Any, gone: float, speed: float) -> float:
+    def _steer_body(self, body: Any, gone: float, speed: float) -> float:
         """Share of the steering to a point ahead: ``tan(delta) = 2 L sin(alpha) / l_d``.
 
         ``alpha`` is its direction as seen from the rear axle, ``l_d`` its distance.

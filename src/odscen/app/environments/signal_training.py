@@ -231,7 +231,7 @@ def compare_controls(
     if unknown:
         raise InputError(f"there is no control {unknown[0]!r}; there are {', '.join(CONTROLS)}")
     made: list[tuple[str, Scenario, BehaviourDoor | None]] = [
-        (name, *_controlled(workspace, given, name)) for name in controls
+        (name, *_run_controlled(workspace, given, name)) for name in controls
     ]
     if agent is not None:
         own = BehaviourDoor(name="signal-agent", options={"agent": str(agent)})
@@ -256,7 +256,7 @@ def compare_controls(
     )
 
 
-def _controlled(
+def _run_controlled(
     workspace: Workspace, scenario: Scenario, control: str
 ) -> tuple[Scenario, BehaviourDoor | None]:
     """The scenario under a control, and what switches its lights."""

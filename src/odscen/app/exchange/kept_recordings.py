@@ -194,7 +194,7 @@ def add_recording(
         for sent in tracks:
             shutil.copyfile(sent.path, folder / _FILES / sent.name)
         size = sum(sent.path.stat().st_size for sent in tracks)
-        read = _work(
+        read = _read_in_child(
             "read_sent_recording",
             folder,
             size,
@@ -215,7 +215,7 @@ def add_recording(
             )  # fmt: skip
             chosen = entry.name
         progress("placing the recording on a map", 0.7)
-        _work(
+        _read_in_child(
             "place_kept_recording",
             folder,
             size,
@@ -268,7 +268,7 @@ def place_recording(
     ):
         for file in (_ABOUT, _TRACKS):
             shutil.copyfile(kept.folder / file, folder / file)
-        _work(
+        _read_in_child(
             "place_kept_recording",
             folder,
             4 * size,  # it is packed
@@ -415,7 +415,7 @@ def _new_recording(workspace: Workspace, stem: str) -> Iterator[tuple[str, Path]
         yield name, folder
 
 
-def _work(
+def _read_in_child(
     job: str, folder: Path, size: int, progress: ProgressCallback, **arguments: Any
 ) -> dict[str, Any]:
     return work_in_child(

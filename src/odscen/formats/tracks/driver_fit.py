@@ -167,7 +167,7 @@ def fit_drivers(rows: pl.DataFrame, *, graph: MapGraph | None = None) -> FittedD
         judged = [following for driver in held_out for following in usable[driver]]
         if judged:
             typical = {name: spread[name]["median"] for name in PARAMETERS}
-            comparison += _compare(category, judged, typical)
+            comparison += _compare_drivers(category, judged, typical)
     drivers = validated(Drivers, {"sets": sets})
     return FittedDrivers(
         drivers, {"model": MODEL, "categories": categories, "comparison": comparison}
@@ -410,7 +410,7 @@ def default_parameters(category: Category) -> dict[str, float]:
     }
 
 
-def _compare(
+def _compare_drivers(
     category: Category, judged: Sequence[Following], typical: Mapping[str, float]
 ) -> list[dict[str, Any]]:
     """Figures of drivers who were held out: recorded, fitted and default."""

@@ -275,12 +275,14 @@ class PpoLearner:
         level, spread = float(known.mean()), float(known.std()) + 1e-8
         episodes = [replace(x, rewards=(x.rewards - level) / spread) for x in episodes]
         widest = max(x.features.shape[1] for x in episodes)
-        pools = [_pool(x.features) for x in episodes]
-        found = [self._advantages(x, pool) for x, pool in zip(episodes, pools, strict=True)]
+        pools = [_pool_features(x.features) for x in episodes]
+        found = [
+            self._estimate_advantages(x, pool) for x, pool in zip(episodes, pools, strict=True)
+        ]
         advantage = np.concatenate([pair[0] for pair in found])
         target = np.concatenate([pair[1] for pair in found]).astype(np.float32)
         pooled = np.concatenate(pools)
-        features = np.concatenate([_widen(x.features, widest) for x in episodes])
+        features = np.concatenate([_widen_features(x.features, widest) for x in episodes])
         there = np.concatenate(
             [np.tile(np.arange(widest) < x.features.shape[1], (len(x.free), 1)) for x in episodes]
         )
@@ -291,22 +293,24 @@ class PpoLearner:
         advantage = (advantage - own.mean()) / (own.std() + 1e-8) if len(own) else advantage
         rate = settings.rate * (0.1 + 0.9 * left)
         for _ in range(settings.epochs):
-            for rows in self._batches(free):
+            for rows in self._draw_batches(free):
                 self._improve_policy(
                     features[rows], there[rows], chosen[rows], logp[rows], advantage[rows],
                     rate=rate, entropy=settings.entropy * left,
                 )  # fmt: skip
-            for rows in self._batches(np.arange(len(target))):
+            for rows in self._draw_batches(np.arange(len(target))):
                 layers = self._value.layers(pooled[rows])
                 error = (layers[-1] - target[rows, None]) / np.float32(len(rows))
                 self._value = self._adams[1].step(self._value, layers, error, rate)
 
-    def _batches(self, rows: IntArray) -> list[IntArray]:
+    def _draw_batches(self, rows: IntArray) -> list[IntArray]:
         order = self._rng.permutation(rows)
         size = self._settings.batch
         return [order[k : k + size] for k in range(0, len(order), size)]
 
-    def _advantages(self, episode: LightEpisode, pooled: Array) -> tuple[FloatArray, FloatArray]:
+    def _estimate_advantages(
+        self, episode: LightEpisode, pooled: Array
+    ) -> tuple[FloatArray, FloatArray]:
         """Advantages of what was chosen, and what the values should have been."""
         settings = self._settings
         values = self._value(pooled)[:, 0].astype(np.float64)
@@ -378,7 +382,7 @@ class _Adam:
         return SmallNetwork(tuple(weights))
 
 
-def _pool(features: Array) -> Array:
+def _pool_features(features: Array) -> Array:
     """What is known of a light as a whole: means over its stages, and the stage that is shown."""
     shown = features[:, :, FEATURES.index("is shown")] > 0.5
     return np.concatenate(
@@ -386,5 +390,5 @@ def _pool(features: Array) -> Array:
     )
 
 
-def _widen(features: Array, width: int) -> Array:
+def _widen_features(features: Array, width: int) -> Array:
     return np.pad(features, ((0, 0), (0, width - features.shape[1]), (0, 0)))

@@ -41,7 +41,7 @@ _STRAIGHT = 0.02
 """Radians that a stretch may bend: places are those on a straight line."""
 
 
-def _stationary(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+def _place_stationary(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     speed, overlap, ttc = values["ego_speed"], values["overlap"], values["ttc"]
     length, width = body_length(site, Category.CAR), site.usable.bodies[Category.CAR].width
     gap = speed * ttc
@@ -89,7 +89,7 @@ STATIONARY = SceneTemplate(
         ),
         TemplateParameter("ttc", 4, 1, 20, "s", "time to collision at the start"),
     ),
-    place=_stationary,
+    place=_place_stationary,
 )
 
 
@@ -223,7 +223,7 @@ CUT_OUT = SceneTemplate(
 )
 
 
-def _drift(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+def _place_drift(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     speed, aside = values["ego_speed"], values["lateral_speed"]
     length, width = body_length(site, Category.CAR), site.usable.bodies[Category.CAR].width
 
@@ -299,5 +299,5 @@ DRIFT = SceneTemplate(
         TemplateParameter("lateral_speed", 0.5, 0.1, 2, "m/s", "speed at which the ego drifts"),
         TemplateParameter("approach", 2, 0.5, 20, "s", "time before it"),
     ),
-    place=_drift,
+    place=_place_drift,
 )

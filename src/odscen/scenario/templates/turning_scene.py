@@ -60,7 +60,7 @@ class _Turn(NamedTuple):
     begin: float
 
 
-def _turning(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+def _place_turning(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     why: Counter[str] = Counter()
     turns = {id(turn.path): turn for turn in _find_turns(site, why)}
 
@@ -192,5 +192,5 @@ TURNING = SceneTemplate(
         TemplateParameter("walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian"),
         TemplateParameter("approach", 1, 0.2, 20, "s", "time before the pedestrian starts"),
     ),
-    place=_turning,
+    place=_place_turning,
 )

@@ -325,7 +325,7 @@ VAN_AND_WALKER = SceneTemplate(
 )
 
 
-def _reversing(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+def _place_reversing(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
     for reach in _REACHES:
         try:
             return _reversing_scene(site, values, reach)
@@ -406,5 +406,5 @@ REVERSING = SceneTemplate(
             "beyond", 1, 0, 10, "s", "time that it reverses on behind the pedestrian's path"
         ),
     ),
-    place=_reversing,
+    place=_place_reversing,
 )

@@ -166,9 +166,9 @@ class LightRun:
         try:
             chosen = checked_stages(self._model.switch(seen, self._state), self._scene)
         except OdscenError as error:
-            raise self._failure(now, str(error)) from error
+            raise self._describe_failure(now, str(error)) from error
         except Exception as error:  # whatever code from outside may raise
-            raise self._failure(now, f"switch failed: {error!r}") from error
+            raise self._describe_failure(now, f"switch failed: {error!r}") from error
         for held, light, stage in zip(self._held, seen.lights, chosen, strict=True):
             if light.may_switch and stage not in {KEEP, held.stage}:
                 held.switch_to(stage, now)
@@ -224,5 +224,5 @@ class LightRun:
             leaving,
         )  # fmt: skip
 
-    def _failure(self, time: float, words: str) -> SimulationError:
+    def _describe_failure(self, time: float, words: str) -> SimulationError:
         return SimulationError(f"behaviour {self._name} at {time:g} s: {words}")

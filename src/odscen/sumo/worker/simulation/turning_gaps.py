@@ -196,20 +196,20 @@ class TurningGaps:
             try:
                 lane = self._lane_of(name)
             except self._errors:  # it has arrived
-                self._leave(name)
+                self._forget_vehicle(name)
                 continue
             turn = lanes.get(lane)
             if turn is None or name in moved:
                 self._set_ignored(name, ())
                 if lane not in lanes:
-                    self._leave(name)
+                    self._forget_vehicle(name)
                     self._plan_look(name, 1)
             elif lane != turn.waiting:
                 self._set_ignored(name, self._passed_on_way(name, turn))
             elif not self._may_go(turn, lane, lights):
                 self._set_ignored(name, ())
             elif self._route_name_of(name) != route:
-                self._leave(name)
+                self._forget_vehicle(name)
                 self._plan_look(name, 1)
             else:
                 self._set_ignored(name, self._passed_by(name, turn))
@@ -256,21 +256,21 @@ class TurningGaps:
             if self._due_of.get(name) == self._step:
                 del self._due_of[name]
                 with suppress(*self._errors):  # it may be gone
-                    self._look(name)
+                    self._look_at(name)
 
     def _plan_look(self, name: str, steps: int) -> None:
         due = self._step + steps
         self._due_of[name] = due
         self._due.setdefault(due, []).append(name)
 
-    def _look(self, name: str) -> None:
+    def _look_at(self, name: str) -> None:
         """Note a vehicle that is near a turn; else say when it may be, at the earliest."""
         length, gains, factor = self._body_of(name)
         if length > _LONGEST:
             return
         lane, index = self._lane_of(name), self._index_of(name)
         if not lane or index < 0:  # it is being teleported
-            self._plan_look(name, self._steps(1.0))
+            self._plan_look(name, self._count_steps(1.0))
             return
         route, inside = self._route_named(name), lane in self._lanes.internal
         number = bisect_left(route.places, index)
@@ -294,7 +294,7 @@ class TurningGaps:
                 last = route.seconds[place] - route.seconds[place - 1]
                 driving -= last * min(1.0, _NEAR / (route.metres[place] - route.metres[place - 1]))
             again = min(again, max(gaining, driving / factor))
-        self._plan_look(name, self._steps(again))
+        self._plan_look(name, self._count_steps(again))
 
     def _route_named(self, name: str) -> _Route:
         """The route of a vehicle, with the turns on it."""
@@ -309,7 +309,7 @@ class TurningGaps:
         known = _Route(route_name, after, [], [], [], [])
         metres = seconds = 0.0
         for edge in edges:
-            length, speed = self._shortest(edge)
+            length, speed = self._find_shortest(edge)
             metres, seconds = metres + length, seconds + length / speed
             known.metres.append(metres)
             known.seconds.append(seconds)
@@ -323,7 +323,7 @@ class TurningGaps:
         self._routes[route_name] = known
         return known
 
-    def _leave(self, name: str) -> None:
+    def _forget_vehicle(self, name: str) -> None:
         self._set_ignored(name, ())
         del self._near[name]
 
@@ -392,14 +392,20 @@ class TurningGaps:
                         continue
                     own = times.get(crossing)
                     if own is None:
-                        own = times[crossing] = self._cross(name, turn, crossing, waits=waits)
-                    yield other, self._passes(other, to_line - position_of(other), crossing), own
+                        own = times[crossing] = self._find_crossing(
+                            name, turn, crossing, waits=waits
+                        )
+                    yield (
+                        other,
+                        self._time_passage(other, to_line - position_of(other), crossing),
+                        own,
+                    )
 
-    def _steps(self, seconds: float) -> int:
+    def _count_steps(self, seconds: float) -> int:
         """Whole steps, one at least."""
         return max(1, int(seconds / self._step_length + 1e-6))
 
-    def _cross(
+    def _find_crossing(
         self, name: str, turn: _Turn, crossing: _Crossing, *, waits: bool
     ) -> tuple[float, float]:
         """Seconds to when who turns gets to where paths cross, and to when it has left, at least.
@@ -424,7 +430,7 @@ class TurningGaps:
         pairs = pairwise(edges[begin : begin + _EDGES])
         return next((after for before, after in pairs if before == edge), None)
 
-    def _passes(self, name: str, to_line: float, crossing: _Crossing) -> tuple[float, float]:
+    def _time_passage(self, name: str, to_line: float, crossing: _Crossing) -> tuple[float, float]:
         """Seconds to when a vehicle is where paths cross, at least, and to when it is past."""
         length, gains, factor = self._body_of(name)
         speed, inside = self._speed_of(name), crossing.inside * factor
@@ -441,7 +447,7 @@ class TurningGaps:
     # ------------------------------------------------------------------------ the network
 
     @cached_property
-    def _before(self) -> dict[str, list[str]]:
+    def _find_before(self) -> dict[str, list[str]]:
         """Lanes that lead to a lane."""
         before: dict[str, list[str]] = defaultdict(list)
         for name, links in self._lanes.links_of.items():
@@ -450,7 +456,7 @@ class TurningGaps:
         return before
 
     @cached_property
-    def _entries(self) -> dict[str, list[tuple[str, str, str]]]:
+    def _find_entries(self) -> dict[str, list[tuple[str, str, str]]]:
         """Connections into junctions, by junction: lanes before, behind, and the first inside."""
         entries: dict[str, list[tuple[str, str, str]]] = defaultdict(list)
         for name, links in self._lanes.links_of.items():
@@ -464,7 +470,7 @@ class TurningGaps:
         return str(self._sumo.edge.getToJunction(self._sumo.lane.getEdgeID(lane)))
 
     @cached_property
-    def _lights(self) -> dict[str, tuple[str, int]]:
+    def _find_lights(self) -> dict[str, tuple[str, int]]:
         """The traffic light and its link that lead to a lane inside a junction."""
         lights = self._sumo.trafficlight
         return {
@@ -474,7 +480,7 @@ class TurningGaps:
             for _, _, via in links
         }
 
-    def _shortest(self, edge: str) -> tuple[float, float]:
+    def _find_shortest(self, edge: str) -> tuple[float, float]:
         """Length of the shortest lane of an edge, m, and the highest limit on it, m/s."""
         known = self._edges.get(edge)
         if known is None:
@@ -506,7 +512,7 @@ class TurningGaps:
                         waiting,
                         lane.getLength(waiting),
                         lane.getMaxSpeed(beyond),
-                        *self._lights.get(via, ("", 0)),
+                        *self._find_lights.get(via, ("", 0)),
                         approaches,
                     )
                     found |= {waiting: turn, beyond: turn}
@@ -520,10 +526,10 @@ class TurningGaps:
         shape, edge_of, links_of = lane.getShape, lane.getEdgeID, self._lanes.links_of
         first, own = set(lane.getFoes(source, onto)), np.array(shape(beyond))
         found: dict[str, list[tuple[_Crossing, float, bool]]] = defaultdict(list)
-        for other, other_onto, via in self._entries[self._junction_behind(source)]:
+        for other, other_onto, via in self._find_entries[self._junction_behind(source)]:
             if other not in first or edge_of(other_onto) == edge_of(onto):
                 continue
-            if _turned(shape(source)[-2:], shape(other)[-2:]) < _OPPOSING:
+            if _measure_turn(shape(source)[-2:], shape(other)[-2:]) < _OPPOSING:
                 continue
             parts = [via, *(link[4] for link in links_of[via] if link[4])]
             path = [*shape(parts[0]), *(point for part in parts[1:] for point in shape(part)[1:])]
@@ -539,11 +545,11 @@ class TurningGaps:
             for part in parts:
                 found[part].append((crossing, to_line, True))
                 to_line -= lane.getLength(part)
-            for name, rest in self._upstream(other):
+            for name, rest in self._list_upstream(other):
                 found[name].append((crossing, rest, False))
         return tuple((name, tuple(paths)) for name, paths in found.items())
 
-    def _upstream(self, last: str) -> list[tuple[str, float]]:
+    def _list_upstream(self, last: str) -> list[tuple[str, float]]:
         """Lanes that lead to a stop line, with the metres from their begin to it."""
         found, ahead, known = [], [(last, 0.0)], {last}
         while ahead:
@@ -551,7 +557,7 @@ class TurningGaps:
             to_line = rest + self._sumo.lane.getLength(name)
             found.append((name, to_line))
             if to_line < _SIGHT:
-                more = [lane for lane in self._before[name] if lane not in known]
+                more = [lane for lane in self._find_before[name] if lane not in known]
                 known.update(more)
                 ahead += [(lane, to_line) for lane in more]
         return found
@@ -568,7 +574,7 @@ def _seconds(metres: float, speed: float, gains: float, limit: float) -> float:
     return (limit - speed) / gains + (metres - gaining) / limit
 
 
-def _turned(step: Sequence[_Point], other: Sequence[_Point]) -> float:
+def _measure_turn(step: Sequence[_Point], other: Sequence[_Point]) -> float:
     """Angle between two steps, 0 to pi."""
     (ax, ay), (bx, by) = ((end[0] - start[0], end[1] - start[1]) for start, end in (step, other))
     return abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))

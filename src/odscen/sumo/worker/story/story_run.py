@@ -150,10 +150,10 @@ class StoryRun:
         wanted, events = self._engine.step(self._view)
         if contacts or events:
             recorder.events.extend([*contacts, *map(self._rule_event, events)])
-        self._obey(road, wanted, moved, recorder, time)
+        self._obey_order(road, wanted, moved, recorder, time)
         recorder.events.extend(self._end.look(road, self._engine, time))
 
-    def _obey(
+    def _obey_order(
         self,
         road: MovedActors,
         wanted: Mapping[str, WantedMove],
