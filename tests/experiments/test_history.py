@@ -69,6 +69,18 @@ def test_the_sentence_names_both_values_the_commit_and_other_seeds() -> None:
     assert told_lines(history[:2], find_trends(history[:2])) == ["No figure has changed in 2 runs."]
 
 
+def test_suites_of_one_file_are_kept_apart_though_their_scenarios_have_one_name() -> None:
+    history = []
+    for number, delay in ((1, 30.0), (2, 30.0), (3, 36.0)):
+        own = line(number, {"mean_delay": delay})
+        history += [
+            own,
+            HistoryLine("large", own.commit, own.date, line(1, {"mean_delay": 90.0}).cases),
+        ]
+    found = {trend.scenario: len(trend.levels) for trend in find_trends(history)}
+    assert found == {"small: town": 2, "large: town": 1}
+
+
 def test_a_file_keeps_a_line_a_run_and_the_last_of_a_commit_counts(tmp_path: Path) -> None:
     file = tmp_path / "deep" / "history.jsonl"
     for number, delay in ((1, 30.0), (2, 31.0), (1, 36.0)):

@@ -12,6 +12,7 @@ from PIL import Image
 from starlette.testclient import TestClient
 from typer.testing import CliRunner
 
+from odscen.app.doctor import examine
 from odscen.cli.commands import command_line
 from odscen.maps.background import PicturePoint
 from odscen.maps.store import Workspace
@@ -76,6 +77,22 @@ def test_a_removed_map_takes_its_picture_along_and_brings_it_back(workspace: Wor
     found = workspace.background("signal_crossing")
     assert found is not None
     assert found.path.read_bytes() == picture()
+
+
+@pytest.mark.parametrize("file", ["background.json", "picture.png", "SHA256SUMS"])
+def test_a_changed_byte_of_a_picture_is_noticed(
+    client: TestClient, workspace: Workspace, file: str
+) -> None:
+    points = [PicturePoint(0, 0, -50, 25), PicturePoint(200, 0, 50, 25)]
+    path = workspace.set_background("signal_crossing", picture(), points=points).path.parent / file
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    refused = client.get(f"{URL}/picture")
+    assert 400 <= refused.status_code < 500
+    assert file in refused.text
+    assert [(step.what, step.harm) for step in examine(workspace)] == [("background", True)]
+    assert client.delete(URL).status_code == 204
 
 
 def test_a_mended_copy_has_the_picture_too(workspace: Workspace) -> None:

@@ -757,7 +757,7 @@ export interface paths {
     "/api/recordings": {
         /**
          * List Recordings
-         * @description All recordings, those that came last first.
+         * @description All recordings that are not damaged, those that came last first.
          */
         get: operations["list_recordings_api_recordings_get"];
         /**
@@ -774,7 +774,7 @@ export interface paths {
         get: operations["show_recording_api_recordings__name__get"];
         /**
          * Delete Recording
-         * @description Delete a recording; scenarios that were made of it stay.
+         * @description Delete a recording, damaged or not; scenarios that were made of it stay.
          */
         delete: operations["delete_recording_api_recordings__name__delete"];
     };
@@ -7827,10 +7827,7 @@ export interface operations {
         };
         responses: {
             /** @description Successful Response */
-            200: {
-                content: {
-                    "application/json": components["schemas"]["RecordingRow"];
-                };
+            204: {
             };
             default: components["responses"]["Error"];
         };

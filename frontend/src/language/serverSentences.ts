@@ -1137,7 +1137,6 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "reading the scenario" }),
   msg({ message: "recording" }),
   msg({ message: "recording {name}" }),
-  msg({ message: "recording {name} is damaged: {error}" }),
   msg({ message: "red light" }),
   msg({ message: "redraw must be one of {redraws}, not {redraw}" }),
   msg({ message: "region must be four numbers, metres, not {region}" }),

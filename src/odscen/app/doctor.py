@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from odscen.app.map_repairs import see_to_assets, see_to_map
+from odscen.app.map_repairs import see_to_assets, see_to_folder, see_to_map
 from odscen.app.running.run_repairs import see_to_run
 from odscen.base.system_errors import disk_errors
+from odscen.maps.background import BACKGROUNDS
+from odscen.maps.folder_names import is_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -47,6 +49,13 @@ def examine(
         yield from see_to_assets(workspace, repair=repair)
         for name in workspace.map_names():
             yield from see_to_map(workspace, name, repair=repair)
+        for what, within in (
+            ("background", workspace.root / "maps" / BACKGROUNDS),
+            ("recording", workspace.recordings),
+        ):
+            for folder in sorted(within.iterdir()) if within.is_dir() else ():
+                if is_name(folder.name):
+                    yield from see_to_folder(workspace, what, folder, repair=repair)
         kept = workspace.runs.iterdir() if workspace.runs.is_dir() else ()
         for run in sorted({*kept, *runs}):
             if run.is_dir() and not run.name.startswith("."):

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 from itertools import chain, count
 from typing import TYPE_CHECKING, Any, Literal
 
-from odscen.base.checksums import SUMS_FILE, file_digest, sums_of, write_sums
+from odscen.base.checksums import SUMS_FILE, check_files, file_digest, sums_of, write_sums
 from odscen.base.errors import DamagedError, InputError, OdscenError
 from odscen.maps.map_entry import INFO_FILE, XODR_FILE, read_entry
 from odscen.simulators.assets import BLUEPRINTS_FILE
@@ -39,7 +39,7 @@ class RepairStep:
     Attributes
     ----------
     what
-        ``map``, ``run`` or ``assets``.
+        ``map``, ``run``, ``recording``, ``background`` or ``assets``.
     name
         Of it.
     action
@@ -77,6 +77,20 @@ def see_to_assets(workspace: Workspace, *, repair: bool) -> Iterator[RepairStep]
             place = set_aside(workspace.assets_folder / BLUEPRINTS_FILE, workspace.root)
             words = f"{error}; the models that ship are used"
             step = replace(step, action="set aside", words=words, place=str(place))
+        yield step
+
+
+def see_to_folder(
+    workspace: Workspace, what: str, folder: Path, *, repair: bool
+) -> Iterator[RepairStep]:
+    """Yield a step if a folder is damaged that nothing can make anew: it is set aside."""
+    try:
+        check_files(folder)
+    except DamagedError as error:
+        step = RepairStep(what, folder.name, "found", listed(error.files))
+        if repair:
+            place = set_aside(folder, workspace.root)
+            step = replace(step, action="set aside", place=str(place))
         yield step
 
 

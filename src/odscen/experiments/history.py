@@ -99,7 +99,8 @@ class Trend(NamedTuple):
     Attributes
     ----------
     scenario, figure
-        Which one; the figure by its name.
+        Which one, the figure by its name; where the history has several suites, the scenario with
+        that of its own, as these may have scenarios of one name.
     places
         In the history, of the runs that have it.
     values
@@ -217,7 +218,7 @@ def read_history(file: Path) -> tuple[HistoryLine, ...]:
             continue
         try:
             line = _parse_line(json.loads(text))
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise InputError(
                 f"no line of a history: {error!r}", file=str(file), element=f"line {number}"
             ) from error
@@ -292,17 +293,15 @@ def find_levels(values: Sequence[float], places: Sequence[int], figure: Figure) 
 
 def find_trends(history: Sequence[HistoryLine]) -> tuple[Trend, ...]:
     """Figures of all scenarios, those first that have changed last."""
-    keys: dict[tuple[str, str], None] = {}
-    for line in history:
+    several = len({line.suite for line in history}) > 1
+    runs: dict[tuple[str, str], list[tuple[int, CaseLine]]] = {}
+    for place, line in enumerate(history):
         for name, case in line.cases.items():
-            keys |= dict.fromkeys((name, figure) for figure in case.figures)
+            told = f"{line.suite}: {name}" if several else name
+            for figure in case.figures:
+                runs.setdefault((told, figure), []).append((place, case))
     found = []
-    for scenario, figure in keys:
-        there = [
-            (place, line.cases[scenario])
-            for place, line in enumerate(history)
-            if scenario in line.cases and figure in line.cases[scenario].figures
-        ]
+    for (scenario, figure), there in runs.items():
         values = [case.figures[figure] for _, case in there]
         places = [place for place, _ in there]
         levels = find_levels(values, places, figure_of("run", figure))

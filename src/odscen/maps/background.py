@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 import numpy as np
 
 from odscen.base.atomic_folders import new_folder
+from odscen.base.checksums import SUMS_FILE, read_checked, read_sums, sums_of, write_sums
 from odscen.base.errors import InputError, MissingDependencyError, in_file
 from odscen.base.stored_files import stored_document
 from odscen.base.system_errors import disk_errors
@@ -81,6 +82,11 @@ class Background:
     width: int
     height: int
     affine: Affine
+
+    def read(self) -> bytes:
+        """Content of the picture; :class:`DamagedError` if it is not as it was written."""
+        folder = self.path.parent
+        return read_checked(folder, self.path.name, read_sums(folder) or {})
 
     def to_dict(self) -> dict[str, object]:
         """As JSON has it."""
@@ -247,6 +253,7 @@ def write_background(folder: Path, content: bytes, background: Background) -> Ba
                 "affine": list(background.affine),
             }
             write_text(made / _FILE, json.dumps(described, indent=2) + "\n")
+            write_sums(made, sums_of(made), hidden=True)
     found = read_background(folder)
     assert found is not None
     return found
@@ -257,16 +264,17 @@ def read_background(folder: Path) -> Background | None:
 
     Raises
     ------
-    InputError
-        If what is said of its place is damaged.
+    DamagedError
+        If what is said of its place is not as it was written.
     """
-    file = folder / _FILE
-    if not file.is_file():
+    if not (folder / SUMS_FILE).is_file():
         return None
+    file = folder / _FILE
+    content = read_checked(folder, _FILE, read_sums(folder) or {})
     with (
         in_file(str(file)),
         stored_document(
-            file.read_bytes(), form=_FORM, version=_VERSION, what="the place of a picture"
+            content, form=_FORM, version=_VERSION, what="the place of a picture"
         ) as told,
     ):
         media = cast("MediaType", str(told["media_type"]))

@@ -9,13 +9,11 @@ import numpy as np
 
 from odscen.base.arrays import offsets
 from odscen.base.errors import InputError
-from odscen.base.given_files import read_given
 from odscen.convert.verify.fidelity_result import NEAR
 from odscen.drawing.legend import RenderOptions
 from odscen.drawing.map_drawing import Lines
 from odscen.drawing.map_sheet import Underlay, render_drawing, svg_to_png
 from odscen.drawing.svg_layers import PlaceMarks
-from odscen.maps.background import MOST_BYTES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -76,7 +74,7 @@ def draw_map(
 
 def _read_underlay(background: Background) -> Underlay:
     return Underlay(
-        read_given(background.path, most=MOST_BYTES),
+        background.read(),
         background.media_type,
         background.width,
         background.height,

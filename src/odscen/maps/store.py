@@ -446,8 +446,7 @@ class Workspace:
         )
         under = self.background(name)
         if under is not None and self.background(out) is None:
-            content = read_given(under.path, most=MOST_BYTES)
-            write_background(self._background_folder(out), content, under)
+            write_background(self._background_folder(out), under.read(), under)
         return mended
 
     def background(self, name: str) -> Background | None:
@@ -457,8 +456,8 @@ class Workspace:
         ------
         NotFoundError
             If there is no such map.
-        InputError
-            If what is said of its place is damaged.
+        DamagedError
+            If what is said of its place is not as it was written.
         """
         return read_background(self._background_folder(name))
 

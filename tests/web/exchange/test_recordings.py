@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from odscen.app.doctor import examine
 from odscen.app.exchange.imports import DiskFile
 from odscen.base.errors import InputError
 from odscen.formats.tracks.read_recording import choose_recording
+from odscen.maps.store import Workspace
 from tests.formats.tracks.test_tracks_on_maps import crossing_traffic
 from tests.web.conftest import job as result_of
 
@@ -109,6 +111,36 @@ def test_a_part_becomes_a_scenario_with_its_tracks_as_ghosts(
     assert client.get("/api/recordings").json() == []
     assert client.get(f"/api/recordings/{recording}").status_code == 404
     assert client.get(f"/api/scenarios/{job['result']}/ghosts").json() != []
+
+
+@pytest.mark.parametrize(
+    ("file", "route"),
+    [
+        ("about.json", ""),
+        ("SHA256SUMS", ""),
+        ("agreement.svg", "/picture"),
+        ("rows.bin", "/moments"),
+        ("times.bin", "/moments"),
+        ("first.bin", "/moments"),
+        ("placed.parquet", "/maps"),
+    ],
+)
+def test_a_changed_byte_of_a_recording_is_noticed_and_hides_no_other(
+    client: TestClient, workspace: Workspace, recording: str, file: str, route: str
+) -> None:
+    assert client.get(f"/api/recordings/{recording}{route}").status_code == 200
+    path = workspace.recordings / recording / file
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    refused = client.get(f"/api/recordings/{recording}{route}")
+    assert 400 <= refused.status_code < 500
+    assert file in refused.text
+    assert client.get("/api/recordings").status_code == 200
+    steps = list(examine(workspace))
+    assert [(step.what, step.name, step.harm) for step in steps] == [("recording", recording, True)]
+    assert client.delete(f"/api/recordings/{recording}").status_code == 204
+    assert client.get("/api/recordings").json() == []
 
 
 def test_a_recording_that_lies_elsewhere_is_moved_onto_the_lanes(client: TestClient) -> None:

@@ -11,6 +11,7 @@ import re
 import shutil
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import count
 from math import degrees
 from pathlib import Path, PurePosixPath
@@ -22,14 +23,22 @@ from odscen.app.exchange.imports import DiskFile, maps_for_import
 from odscen.app.exchange.recorded_traffic import show_recording
 from odscen.app.maps import load_map
 from odscen.base.atomic_folders import discard, new_folder
-from odscen.base.checksums import digest
+from odscen.base.checksums import (
+    SUMS_FILE,
+    check_files,
+    digest,
+    read_checked,
+    read_sums,
+    sums_of,
+    write_sums,
+)
 from odscen.base.errors import InputError, NotFoundError
 from odscen.base.folder_locks import locked
 from odscen.base.shown import printable
 from odscen.base.system_errors import disk_errors
 from odscen.formats.base import VERDICTS, ElementReport, ImportMap
 from odscen.formats.tracks.lane_places import estimate_offset, share_on_lanes
-from odscen.formats.tracks.moments import Moments, read_moments, write_moments
+from odscen.formats.tracks.moments import MOMENT_FILES, Moments, read_moments, write_moments
 from odscen.formats.tracks.read_recording import choose_recording, map_offset, read_recording
 from odscen.formats.tracks.recorded_traffic import RecordedTraffic, shift_tracks
 from odscen.formats.tracks.scenario_of_tracks import SceneChoice, scenario_of_tracks
@@ -110,14 +119,32 @@ class KeptRecording:
     def moments(self, begin: float, end: float, *, most: int) -> Moments:
         """Who was where, see :func:`~odscen.formats.tracks.moments.read_moments`."""
         with disk_errors(f"recording {self.name!r}"):
+            for file in MOMENT_FILES:
+                self.checked(file)
             return read_moments(self.folder, begin, end, most=most)
 
     def picture(self) -> bytes:
         """Map and tracks, as SVG; :class:`NotFoundError` without a map."""
-        path = self.folder / _PICTURE
-        if not path.is_file():
+        if self.about["map"] is None:
             raise NotFoundError("drawing of recording", self.name, [])
-        return path.read_bytes()
+        return self.checked(_PICTURE).read_bytes()
+
+    def checked(self, file: str) -> Path:
+        """Path of one of its files, which is as it was written; else :class:`DamagedError`."""
+        path = self.folder / file
+        try:
+            about = path.stat()
+        except OSError:
+            check_files(self.folder, only=(file,))
+            raise
+        _check_once(self.folder, file, about.st_mtime_ns, about.st_ctime_ns, about.st_size)
+        return path
+
+
+@lru_cache(maxsize=256)
+def _check_once(folder: Path, file: str, *_stamp: int) -> None:
+    """Compare a file with its checksum unless it is known to be that file: it may be large."""
+    check_files(folder, only=(file,))
 
 
 def recording_names(workspace: Workspace) -> list[str]:
@@ -125,8 +152,10 @@ def recording_names(workspace: Workspace) -> list[str]:
     folder = workspace.recordings
     if not folder.is_dir():
         return []
-    found = [path for path in folder.iterdir() if is_name(path.name) and (path / _ABOUT).is_file()]
-    times = {path: (path / _ABOUT).stat().st_mtime for path in found}
+    found = [
+        path for path in folder.iterdir() if is_name(path.name) and (path / SUMS_FILE).is_file()
+    ]
+    times = {path: (path / SUMS_FILE).stat().st_mtime for path in found}
     return [path.name for path in sorted(found, key=lambda path: (-times[path], path.name))]
 
 
@@ -137,22 +166,33 @@ def open_recording(workspace: Workspace, name: str) -> KeptRecording:
     ------
     NotFoundError
         If there is none of that name.
+    DamagedError
+        If what is known of it is not as it was written.
     """
-    check_name(name, what="recording")
-    folder = workspace.recordings / name
-    try:
-        about = json.loads((folder / _ABOUT).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise NotFoundError("recording", name, recording_names(workspace)) from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"recording {name!r} is damaged: {error}") from error
+    folder = _recording_folder(workspace, name)
+    about = json.loads(read_checked(folder, _ABOUT, read_sums(folder) or {}))
     return KeptRecording(name, folder, about)
 
 
 def remove_recording(workspace: Workspace, name: str) -> None:
-    """Delete a recording; scenarios that were made of it stay as they are."""
+    """Delete a recording, damaged or not; scenarios that were made of it stay as they are.
+
+    Raises
+    ------
+    NotFoundError
+        If there is none of that name.
+    """
+    folder = _recording_folder(workspace, name)
     with disk_errors(f"recording {name!r}"):
-        discard(open_recording(workspace, name).folder)
+        discard(folder)
+
+
+def _recording_folder(workspace: Workspace, name: str) -> Path:
+    check_name(name, what="recording")
+    folder = workspace.recordings / name
+    if not (folder / SUMS_FILE).is_file():  # none is without one
+        raise NotFoundError("recording", name, recording_names(workspace))
+    return folder
 
 
 def add_recording(
@@ -228,6 +268,7 @@ def add_recording(
             added=[entry.name for entry in added],
         )
         shutil.rmtree(folder / _FILES)
+        write_sums(folder, sums_of(folder), hidden=True)
     return open_recording(workspace, name)
 
 
@@ -260,14 +301,14 @@ def place_recording(
     map_offset(offset)
     workspace.stored(on_map)
     progress("placing the recording on a map", 0.0)
-    size = (kept.folder / _TRACKS).stat().st_size
+    size = kept.checked(_TRACKS).stat().st_size
     with (
         disk_errors(f"recording {name!r}"),
         locked(kept.folder, what=f"recording {name!r}", patience=_PATIENCE),
         new_folder(kept.folder) as folder,
     ):
         for file in (_ABOUT, _TRACKS):
-            shutil.copyfile(kept.folder / file, folder / file)
+            shutil.copyfile(kept.checked(file), folder / file)
         _read_in_child(
             "place_kept_recording",
             folder,
@@ -280,6 +321,7 @@ def place_recording(
             estimate=estimate,
             added=[],
         )
+        write_sums(folder, sums_of(folder), hidden=True)
     return open_recording(workspace, name)
 
 
@@ -297,7 +339,7 @@ def fitting_maps_of(workspace: Workspace, name: str) -> list[FittingMap]:
     """The same for one that is kept, where it is placed now."""
     kept = open_recording(workspace, name)
     with disk_errors(f"recording {name!r}"):
-        return fitting_maps(workspace, pl.read_parquet(kept.folder / _PLACED))
+        return fitting_maps(workspace, pl.read_parquet(kept.checked(_PLACED)))
 
 
 def scenario_of_recording(
@@ -320,7 +362,7 @@ def scenario_of_recording(
     if not begin < end:
         raise InputError(f"the window from {begin:g} to {end:g} s is empty")
     rows = (
-        pl.scan_parquet(kept.folder / _PLACED)
+        pl.scan_parquet(kept.checked(_PLACED))
         .filter(pl.col("time").is_between(begin - 1e-6, end + 1e-6))
         .collect()
     )

@@ -19,6 +19,7 @@ _COLUMNS: Final = 5
 TIMES_FILE, FIRST_FILE, ROWS_FILE = "times.bin", "first.bin", "rows.bin"
 """Moments (float64, s), the first row of each and one past the last (int64), and rows of five
 float32: road user, x, y (m from the origin), hdg (rad), speed (m/s)."""
+MOMENT_FILES: Final = (TIMES_FILE, FIRST_FILE, ROWS_FILE)
 _AT_ONCE: Final = 2_000_000
 
 

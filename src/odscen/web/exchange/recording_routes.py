@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import shutil
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -23,6 +24,7 @@ from odscen.app.exchange.kept_recordings import (
 )
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.categories import Category
+from odscen.base.errors import DamagedError
 from odscen.formats.tracks.scenario_of_tracks import SceneChoice
 from odscen.web.exchange.exchange_routes import IMPORT_REPORT
 from odscen.web.jobs import JobResult
@@ -168,9 +170,14 @@ ghosts = APIRouter(prefix="/api/scenarios")
 
 @router.get("")
 def list_recordings(shared: Shared) -> list[RecordingRow]:
-    """All recordings, those that came last first."""
-    names = recording_names(shared.workspace)
-    return [_row_of(open_recording(shared.workspace, name)) for name in names]
+    """All recordings that are not damaged, those that came last first."""
+    rows = []
+    for name in recording_names(shared.workspace):
+        try:
+            rows.append(_row_of(open_recording(shared.workspace, name)))
+        except DamagedError as error:  # one does not hide the others
+            logging.getLogger("odscen").warning("%s; see odscen doctor", error)
+    return rows
 
 
 @router.post("", status_code=202)
@@ -234,12 +241,10 @@ def show_recording(name: str, shared: Shared) -> RecordingInfo:
     )
 
 
-@router.delete("/{name}")
-def delete_recording(name: str, shared: Shared) -> RecordingRow:
-    """Delete a recording; scenarios that were made of it stay."""
-    row = _row_of(open_recording(shared.workspace, name))
+@router.delete("/{name}", status_code=204)
+def delete_recording(name: str, shared: Shared) -> None:
+    """Delete a recording, damaged or not; scenarios that were made of it stay."""
     remove_recording(shared.workspace, name)
-    return row
 
 
 @router.get("/{name}/maps")

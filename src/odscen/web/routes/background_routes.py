@@ -10,7 +10,6 @@ from starlette.responses import Response
 
 from odscen.base.checksums import digest
 from odscen.base.errors import InputError, NotFoundError
-from odscen.base.given_files import read_given
 from odscen.base.shown import printable
 from odscen.maps.background import MOST_BYTES, PicturePoint
 from odscen.web.services import Shared
@@ -43,8 +42,7 @@ def show_picture(name: str, shared: Shared) -> Response:
         "Content-Security-Policy": "default-src 'none'; sandbox",
         "Cache-Control": "no-cache",
     }
-    content = read_given(found.path, most=MOST_BYTES)
-    return Response(content, media_type=found.media_type, headers=headers)
+    return Response(found.read(), media_type=found.media_type, headers=headers)
 
 
 @router.post("")
