@@ -84,7 +84,7 @@ class Background:
     affine: Affine
 
     def read(self) -> bytes:
-        """Content of the picture; :class:`DamagedError` if it is not as it was written."""
+        """Content of the picture; :class:`~odscen.base.errors.DamagedError` if it is not as it was written."""
         folder = self.path.parent
         return read_checked(folder, self.path.name, read_sums(folder) or {})
 

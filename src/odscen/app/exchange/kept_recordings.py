@@ -130,7 +130,7 @@ class KeptRecording:
         return self.checked(_PICTURE).read_bytes()
 
     def checked(self, file: str) -> Path:
-        """Path of one of its files, which is as it was written; else :class:`DamagedError`."""
+        """Path of one of its files, which is as it was written; else :class:`~odscen.base.errors.DamagedError`."""
         path = self.folder / file
         try:
             about = path.stat()
