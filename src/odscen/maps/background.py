@@ -84,7 +84,13 @@ class Background:
     affine: Affine
 
     def read(self) -> bytes:
-        """Content of the picture; :class:`~odscen.base.errors.DamagedError` if it is not as it was written."""
+        """Content of the picture, which is as it was written.
+
+        Raises
+        ------
+        DamagedError
+            If it was changed since.
+        """
         folder = self.path.parent
         return read_checked(folder, self.path.name, read_sums(folder) or {})
 

@@ -130,7 +130,13 @@ class KeptRecording:
         return self.checked(_PICTURE).read_bytes()
 
     def checked(self, file: str) -> Path:
-        """Path of one of its files, which is as it was written; else :class:`~odscen.base.errors.DamagedError`."""
+        """Path of one of its files, which is as it was written.
+
+        Raises
+        ------
+        DamagedError
+            If it was changed since.
+        """
         path = self.folder / file
         try:
             about = path.stat()
