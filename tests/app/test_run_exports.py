@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import math
 import pickle
@@ -17,7 +19,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 import pytest
-from lxml import etree
+from lxml import etree, html
 
 from odscen.app.exchange.exports import export, export_run, export_runs
 from odscen.app.exchange.recorded_traffic import read_recorded_traffic
@@ -30,10 +32,13 @@ from odscen.formats.recordings.track_grid import ExportWindow, instants, tracks_
 from odscen.formats.tracks.osi_trace import osi_fields, read_osi_trace
 from odscen.learning.hetero_data import read_arrays
 from odscen.maps.store import Workspace
+from odscen.records.run_plan import Plan
+from odscen.reports import replay
 from odscen.runs.finished_run import Run
+from odscen.runs.recorded import read_light_states
 from odscen.runs.run_settings import RunSettings
 
-FORMATS = ("pyg", "scenarionet", "waymo", "commonroad", "osi")
+FORMATS = ("pyg", "scenarionet", "waymo", "commonroad", "osi", "html")
 SECONDS = 9.6
 DOCUMENT = Path(__file__).parents[2] / "docs" / "learning-formats.md"
 States = dict[tuple[str, int], tuple[float, float, float]]
@@ -574,3 +579,70 @@ def test_recorded_traffic_is_read_back_within_a_centimetre(
 def test_a_schema_that_is_none_is_refused(workspace: Workspace, run: Run, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="schema is one of interaction, ind, highd, ngsim"):
         export_run(workspace, run.folder, tmp_path, to="recording", options={"schema": "kitti"})
+
+
+# ---------------------------------------------------------------------------- One page
+def _replayed(exports: Path) -> tuple[str, dict[str, Any]]:
+    page = _file(exports, "html/*.html").read_text(encoding="utf-8")
+    data = re.search(r'<script type="application/json" id="replay-data">(.+?)</script>', page)
+    assert data is not None
+    return page, json.loads(data[1])
+
+
+def test_the_page_replays_every_recorded_state(exports: Path, recorded: States) -> None:
+    _, data = _replayed(exports)
+    begin, step = data["begin"], data["step"]
+    found = {
+        (piece["id"], round((begin + (piece["frame"] + row) * step) * 10)): tuple(place)
+        for piece in data["pieces"]
+        for row, place in enumerate(
+            np.cumsum(np.reshape(piece["moves"], (-1, 3)), axis=0) / (100.0, 100.0, 100.0)
+        )
+    }
+    assert found.keys() == recorded.keys()
+    differences = np.array([found[key] for key in recorded]) - np.array(list(recorded.values()))
+    assert np.abs(differences[:, :2]).max() <= 0.005 + 1e-9
+    assert np.abs(np.angle(np.exp(1j * differences[:, 2]))).max() <= 0.005 + 1e-9
+
+
+def test_the_page_shows_what_the_lights_showed(exports: Path, run: Run) -> None:
+    _, data = _replayed(exports)
+    states = read_light_states(run.folder)
+    assert states is not None
+    recorded = states.select("time", "state").rows()
+    shown = [
+        (time, state)
+        for light in data["lights"]
+        for time, state in zip(light["times"], light["states"], strict=True)
+    ]
+    assert len(data["lights"]) == states["light"].n_unique() > 0
+    assert sorted(shown) == sorted(recorded)
+    for light in data["lights"]:
+        letters = [letter for *_, own in light["heads"] for letter in own]
+        assert letters
+        assert max(letters) < len(light["states"][0])
+
+
+def test_the_page_needs_nothing_else_and_runs_only_its_own_scripts(exports: Path) -> None:
+    page, _ = _replayed(exports)
+    root = html.fromstring(page)
+    assert not root.xpath("//@src | //link/@href")
+    assert all(link.startswith("#") for link in root.xpath("//a/@href"))
+    (policy,) = root.xpath("//meta[@http-equiv]/@content")
+    allowed = set(re.findall(r"'sha256-([^']+)'", policy))
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    digests = {base64.b64encode(hashlib.sha256(one.encode()).digest()).decode() for one in scripts}
+    assert len(scripts) == 2
+    assert allowed == digests
+
+
+def test_a_long_replay_keeps_every_nth_instant(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
+    rows = run.trajectories()
+    monkeypatch.setattr(replay, "MOST_PLACES", rows.height // 3)
+    users = Plan.from_json((run.folder / "plan.json").read_text()).actors
+    values = replay.replay_values(users, rows, None, step=0.1)
+    assert values is not None
+    assert (values["thinned"], values["every"]) == (True, pytest.approx(0.4))
+    data = json.loads(values["data"])
+    kept = sum(len(piece["moves"]) // 3 for piece in data["pieces"])
+    assert rows.height / 5 < kept < rows.height / 3

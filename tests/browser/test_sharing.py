@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 from lxml import etree
 from PIL import Image
+from playwright.sync_api import expect
 
 from tests.browser.pages import OdscenPage
-from tests.browser.test_interruptions import MOMENT
+from tests.browser.test_interruptions import MOMENT, begun
 from tools.page import Served
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -88,3 +90,34 @@ def test_the_drawing_of_a_recording_has_its_road_users_and_says_what_colours_mea
     assert "Car" in before
     assert "Car" not in after
     assert any("km/h" in str(one) for one in after)
+
+
+@pytest.mark.slow
+def test_the_page_of_a_run_is_handed_on_and_replays_offline(
+    open_page: Callable[..., OdscenPage], served: Served, sampled: str, tmp_path: Path
+) -> None:
+    user = open_page(served.url)
+    begun(user, sampled, speed=None)
+    page = taken(user, tmp_path, "Share", "Page with replay and report (HTML)")
+    reader = user.page.context.new_page()
+    problems: list[str] = []
+    reader.on("pageerror", lambda error: problems.append(str(error)))
+    reader.on("console", lambda message: problems.append(message.text))
+    reader.context.set_offline(True)
+    try:
+        reader.goto(page.as_uri())
+        stage = reader.locator("#replay-stage")
+        shown = int(stage.get_attribute("data-shown") or 0)
+        assert shown > 0
+        before = stage.screenshot()
+        reader.get_by_role("button", name="Play").click()
+        expect(stage).to_have_attribute("data-time", re.compile(r"^[1-9]"))  # seconds
+        reader.get_by_role("button", name="Pause").click()
+        assert stage.screenshot() != before
+        reader.get_by_role("slider", name="Time").focus()
+        reader.keyboard.press("Home")
+        assert stage.get_attribute("data-time") == "0"
+        assert problems == []
+    finally:
+        reader.context.set_offline(False)
+        reader.close()

@@ -31,6 +31,6 @@ export const exchange = {
     call("get", "/api/scenarios/{name}/export/notes", { params: { path: { name }, query: { to, version } } }),
   exportUrl: (name: string, to: string, version: string | null) =>
     address("/api/scenarios/{name}/export", { params: { path: { name }, query: { to, version } } }),
-  runUrl: (run: string, to: string, version: string) =>
+  runUrl: (run: string, to: string, version?: string) =>
     address("/api/runs/{run}/export", { params: { path: { run }, query: { to, version } } }),
 };

@@ -736,7 +736,7 @@ export interface paths {
     "/api/runs/{run}/export": {
         /**
          * Export Run
-         * @description Download what happened in a finished run in another format, with the map.
+         * @description Download what happened in a finished run: a ZIP with the map, or one page of HTML.
          */
         get: operations["export_run_api_runs__run__export_get"];
     };
@@ -7727,6 +7727,7 @@ export interface operations {
             200: {
                 content: {
                     "application/zip": string;
+                    "text/html": string;
                 };
             };
             default: components["responses"]["Error"];

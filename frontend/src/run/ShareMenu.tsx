@@ -3,6 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { type RefObject, useEffect, useRef, useState } from "react";
 
+import { exchange } from "../api/exchange";
 import type { MapHandle } from "../map/MapCanvas";
 import { tell, tellError } from "../ui/notices";
 import { copyLink, record, type Recording, saveFile, savePicture, saveVector } from "../ui/share";
@@ -84,6 +85,11 @@ export function ShareMenu({
         <Menu.Item onClick={begin}>
           <Trans>Video of the map (WebM)</Trans>
         </Menu.Item>
+        {playing !== null && (
+          <Menu.Item component="a" href={exchange.runUrl(run, "html")} download>
+            <Trans>Page with replay and report (HTML)</Trans>
+          </Menu.Item>
+        )}
         <Menu.Item onClick={() => print()}>
           <Trans>Print</Trans>
         </Menu.Item>

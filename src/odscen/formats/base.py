@@ -184,6 +184,8 @@ class ExportSource:
         Of a run.
     roads
         The road model of the map, for formats that need it.
+    report
+        Gives the page of the run's report with a replay, of a run.
     """
 
     name: str
@@ -195,6 +197,7 @@ class ExportSource:
     options: Mapping[str, str] = field(default_factory=dict)
     recorded: RecordedRun | None = None
     roads: OpenDrive | None = None
+    report: Callable[[], str] | None = None
 
 
 ExportFiles = Mapping[str, "str | bytes | Path"]

@@ -91,17 +91,17 @@ def _template_environment() -> Environment:
     environment.filters["number"] = _format_number
     environment.filters["count"] = lambda value: f"{value:,}"
     environment.filters["route"] = lambda movement: str(movement).replace(">", " > ")
-    script = _read_text("assets", "report.js")
-    environment.globals |= {
-        "page_style": Markup(
-            _read_text("assets", "report.css") + _read_text("assets", "signals.css")
-        ),
-        "page_script": Markup(script),
-        "script_digest": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-    }
+    environment.filters["digest"] = _digest_script
+    styles = [_read_text("assets", f"{name}.css") for name in ("report", "signals", "replay")]
+    environment.globals |= {"page_style": Markup("".join(styles)), "scripts": [PAGE_SCRIPT]}
     # Blocks are also rendered alone, where imports at the top of their template are not seen.
     environment.globals["kit"] = environment.get_template("kit.html.j2").module
     return environment
+
+
+def _digest_script(script: str) -> str:
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return Markup(f"sha256-{digest}")
 
 
 def _format_number(value: float | None, digits: int = 2, missing: str = "-") -> str:
@@ -110,3 +110,9 @@ def _format_number(value: float | None, digits: int = 2, missing: str = "-") -> 
 
 def _read_text(folder: str, name: str) -> str:
     return (files("odscen.reports") / folder / name).read_text(encoding="utf-8")
+
+
+PAGE_SCRIPT = Markup(_read_text("assets", "report.js"))
+"""Script of every page."""
+REPLAY_SCRIPT = Markup(_read_text("assets", "replay.js"))
+"""Script of the block ``replay`` of a run's report."""

@@ -41,7 +41,7 @@ from odscen.reports.front_page import (
     scene_sentences,
     traffic_sentences,
 )
-from odscen.reports.page_templates import render_page
+from odscen.reports.page_templates import PAGE_SCRIPT, REPLAY_SCRIPT, render_page
 from odscen.reports.place_names import NO_NAMES
 from odscen.reports.report_cards import Card, figure_cards, named_cards
 from odscen.reports.report_demand import assignment_values
@@ -105,6 +105,7 @@ def render_report(
     parking: ParkingUse | None = None,
     assignment: Assignment | None = None,
     motion: pl.DataFrame | None = None,
+    replay: Mapping[str, Any] | None = None,
 ) -> str:
     """Write the report of one run.
 
@@ -147,6 +148,8 @@ def render_report(
         How routes by travel time were found, if the scenario wants such.
     motion
         What the plausibility check of motion found, if trajectories were recorded.
+    replay
+        From :func:`odscen.reports.replay.replay_values`, if the run is to be watched on the page.
 
     Returns
     -------
@@ -180,6 +183,8 @@ def render_report(
             title=f"{title} - run report",
             head=_head_values(title, plan, summary, usability),
             scene=scene,
+            replay=replay,
+            scripts=[PAGE_SCRIPT, REPLAY_SCRIPT] if replay else [PAGE_SCRIPT],
             brief=_brief_values(
                 values,
                 usability,

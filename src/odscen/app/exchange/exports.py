@@ -133,6 +133,7 @@ def export_run(
     WorkspaceError
         If the folder cannot be written.
     """
+    from odscen.app.running.reports import replay_page
     from odscen.app.scenarios import read_scenario
     from odscen.runs.finished_run import Run
     from odscen.runs.layout import SCENARIO_FILE
@@ -151,6 +152,7 @@ def export_run(
     seed = opened.known["seed"]  # perhaps another one than the scenario's own
     document = read_scenario(folder / SCENARIO_FILE).model_copy(update={"seed": seed})
     source = _make_source(workspace, document, folder.resolve().name, options, recorded)
+    source = replace(source, report=lambda: replay_page(workspace, folder, recorded))
     if chosen.needs_roads:
         from odscen.opendrive.parse import parse
 

@@ -30,6 +30,7 @@ from odscen.records.row_text import rounded
 from odscen.records.run_events import events_from_json
 from odscen.records.run_plan import Plan
 from odscen.reports.place_names import NO_NAMES, place_names
+from odscen.reports.replay import replay_values
 from odscen.reports.report_maps import place_shapes
 from odscen.reports.report_sections import FEW
 from odscen.reports.report_signals import LightsOfRun
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from odscen.figures.by_place.parking_use import ParkingUse
     from odscen.figures.by_place.traffic import TrafficFigures
     from odscen.figures.measures.figure import RunData
+    from odscen.formats.base import RecordedRun
     from odscen.maps.store import Workspace
     from odscen.reports.place_names import PlaceNames
 
@@ -102,13 +104,46 @@ def write_report(
     InputError
         If a file of the run is missing or torn.
     """
-    with in_file(str(folder)), tables(str(folder)):
-        figures = read_tables(folder / layout.FIGURES_FOLDER) if data is None else data.traffic
-        motion = read_motion(folder / layout.FIGURES_FOLDER) if data is None else data.motion
-        own = folder / layout.FIGURES_FOLDER
-        stations = read_stations(own) if data is None else data.stations
-        page = _render_page(folder, summary, loaded, corridor, figures, stations, motion)
+    page = _read_page(folder, summary, loaded, corridor, data)
     return write_text(out or folder / layout.REPORT_FILE, page)
+
+
+def replay_page(workspace: Workspace, folder: Path, recorded: RecordedRun) -> str:
+    """Page of a finished run with its report and a replay, which needs nothing else.
+
+    Parameters
+    ----------
+    workspace
+        Has the map.
+    recorded
+        Where everybody was.
+
+    Raises
+    ------
+    InputError
+        If the run has not completed, or its map is not in the workspace.
+    DamagedError
+        If a file of the run is not as it was written.
+    """
+    summary = _read_completed_summary(folder)
+    loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
+    return _read_page(folder, summary, loaded, None, None, recorded)
+
+
+def _read_page(
+    folder: Path,
+    summary: Mapping[str, Any],
+    loaded: LoadedMap | None,
+    corridor: Corridor | None,
+    data: RunData | None,
+    recorded: RecordedRun | None = None,
+) -> str:
+    with in_file(str(folder)), tables(str(folder)):
+        own = folder / layout.FIGURES_FOLDER
+        figures = read_tables(own) if data is None else data.traffic
+        motion = read_motion(own) if data is None else data.motion
+        stations = read_stations(own) if data is None else data.stations
+        return _render_page(folder, summary, loaded, corridor, figures, stations, motion, recorded)
 
 
 def _render_page(
@@ -119,6 +154,7 @@ def _render_page(
     figures: TrafficFigures | None,
     stations: pl.DataFrame | None,
     motion: pl.DataFrame | None,
+    watched: RecordedRun | None = None,
 ) -> str:
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8", errors="replace")
@@ -133,9 +169,21 @@ def _render_page(
         followed = corridor_traces(folder, sumo_map, corridor)
         if not chosen and not isinstance(followed, str) and followed.vehicles < FEW:
             followed = None
+    plan = Plan.from_json(text(layout.PLAN_FILE))
+    replay = None
+    if watched is not None and loaded is not None:
+        replay = replay_values(
+            watched.users,
+            watched.rows,
+            loaded.drawing,
+            step=watched.step,
+            clock=plan.clock,
+            lights=loaded.sumo.lights,
+            states=watched.states,
+        )
     return render_report(
         summary,
-        Plan.from_json(text(layout.PLAN_FILE)),
+        plan,
         actors_from_json(text(layout.ACTORS_FILE)),
         events_from_json(text(layout.EVENTS_FILE)),
         recorded.rows if recorded is not None else pl.DataFrame(),
@@ -152,6 +200,7 @@ def _render_page(
         parking=_read_parking_use(folder, summary),
         assignment=_read_assignment(folder),
         motion=motion,
+        replay=replay,
     )
 
 

@@ -184,18 +184,23 @@ def import_plan(name: str, shared: Shared) -> Response:
     return Response(content, media_type="application/json", headers=headers)
 
 
+_PAGE = ".html"
 Options = Annotated[Sequence[str], Query(alias="option", description="NAME=VALUE")]
 
 
-@router.get("/runs/{run}/export", response_class=Response, responses=answers("application/zip"))
+@router.get(
+    "/runs/{run}/export",
+    response_class=Response,
+    responses=answers("application/zip", "text/html"),
+)
 def export_run(
     run: str, shared: Shared, to: str, version: str | None = None, option: Options = ()
 ) -> Response:
-    """Download what happened in a finished run in another format, with the map."""
+    """Download what happened in a finished run: a ZIP with the map, or one page of HTML."""
     options = _given_options(option, version=version)
     folder = shared.runs.kept.whole(run)
     files = export_to_memory(shared.workspace, folder, to=to, options=options)
-    return _as_download(files, f"{run}-as-run.{to}", options)
+    return _as_download(files, f"{run}.{to}" if to == _PAGE[1:] else f"{run}-as-run.{to}", options)
 
 
 @exports.get("/{name}/export/notes")
@@ -238,8 +243,12 @@ def _export_scenario(
 def _as_download(files: ExportedFiles, name: str, options: Mapping[str, str]) -> Response:
     file = "-".join([name, *options.values()])
     plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", file)
-    headers = {"Content-Disposition": f'attachment; filename="{plain}.zip"'}
-    return Response(files.zipped(), media_type="application/zip", headers=headers)
+    content, kind, suffix = files.zipped(), "application/zip", ".zip"
+    if len(files.contents) == 1 and plain.endswith(_PAGE):  # a page is opened as it is
+        ((_, content),) = files.contents.items()
+        kind, suffix = "text/html", ""
+    headers = {"Content-Disposition": f'attachment; filename="{plain}{suffix}"'}
+    return Response(content, media_type=kind, headers=headers)
 
 
 def _read_kept(shared: Services, name: str, file: str) -> str:

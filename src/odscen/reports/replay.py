@@ -1,0 +1,175 @@
+"""A run to be watched inside its report: places of all road users over time, and the map below."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from odscen.base.markup import Markup, element
+from odscen.drawing.svg_layers import LayerOptions, map_layers
+from odscen.reports.report_maps import fitted_view, view_box
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import polars as pl
+
+    from odscen.base.arrays import Bounds
+    from odscen.convert.lane_table.table import SumoLight
+    from odscen.drawing.map_drawing import MapDrawing
+    from odscen.records.run_plan import PlannedActor
+
+MOST_PLACES = 250_000
+"""Places of road users at most; of more, every n-th instant is kept, as the page says."""
+
+_CENTIMETRES = 100.0
+_STEPS_OF_HEADING = 100.0
+"""In one radian."""
+_MOST_OF_MAP = 0.4
+"""From this share of its area on the whole map is shown."""
+
+
+def replay_values(
+    users: Sequence[PlannedActor],
+    rows: pl.DataFrame,
+    drawing: MapDrawing | None,
+    *,
+    step: float,
+    clock: float = 0.0,
+    lights: Sequence[SumoLight] = (),
+    states: pl.DataFrame | None = None,
+) -> dict[str, Any] | None:
+    """Values of the block ``replay`` of a report; ``None`` if nobody moved.
+
+    Parameters
+    ----------
+    users
+        With category and size; others are left out.
+    rows
+        Centres of bodies, as :meth:`odscen.runs.finished_run.Run.trajectories` gives them.
+    drawing
+        Of the map, if there is one.
+    step
+        Between two records, s.
+    clock
+        Time of day at the start, s.
+    lights
+        Of the map.
+    states
+        What they showed, as :func:`odscen.runs.recorded.read_light_states` gives it.
+    """
+    import polars as pl
+
+    if rows.is_empty():
+        return None
+    known = {user.id: user for user in users}
+    first = float(rows["time"].min())  # type: ignore[arg-type]  # a column of floats
+    every = max(-(-rows.height // MOST_PLACES), 1)
+    instant = ((pl.col("time") - first) / step).round().cast(pl.Int64)
+    kept = (
+        rows.with_columns(instant=instant)
+        .filter(pl.col("instant") % every == 0)
+        .with_columns(frame=pl.col("instant") // every)
+        .unique(["id", "frame"], keep="first", maintain_order=True)
+        .sort("id", "frame")
+    )
+    pieces = [
+        piece
+        for [name], own in kept.group_by("id", maintain_order=True)
+        if (user := known.get(str(name))) is not None
+        for piece in _pieces_of(user, own)
+    ]
+    if not pieces:
+        return None
+    bounds = _choose_view(kept, drawing)
+    ground = None
+    if drawing is not None:
+        beside = 0.35 * (bounds[2] - bounds[0])
+        wider = (bounds[0] - beside, bounds[1] - beside, bounds[2] + beside, bounds[3] + beside)
+        options = LayerOptions(symbol_size=1.2, prefix="replay-")
+        ground = element("g", map_layers(drawing.clipped(wider), options), class_="map")
+    svg = element(
+        "svg", ground, viewBox=view_box(bounds), id="replay-map", aria_hidden="true",
+        preserveAspectRatio="xMidYMid meet",
+    )  # fmt: skip
+    frames = int(kept["frame"].max()) + 1  # type: ignore[arg-type]  # a column of integers
+    data = {
+        "begin": round(first, 3), "step": round(step * every, 6), "frames": frames,
+        "clock": clock, "pieces": pieces, "lights": _shown_lights(lights, states),
+    }  # fmt: skip
+    text = json.dumps(data, separators=(",", ":"), sort_keys=True).replace("<", "\\u003c")
+    return {
+        "drawing": svg,
+        "data": Markup(text),
+        "users": len({piece["id"] for piece in pieces}),
+        "every": step * every,
+        "thinned": every > 1,
+        "lights": bool(data["lights"]),
+    }
+
+
+def _choose_view(rows: pl.DataFrame, drawing: MapDrawing | None) -> Bounds:
+    """Where somebody was; the whole map if that is most of it."""
+    fitted = fitted_view(rows.select("x", "y").to_numpy(), drawing)
+    assert fitted is not None  # there are places
+    if drawing is None or _area(fitted) < _MOST_OF_MAP * _area(drawing.bounds):
+        return fitted
+    return drawing.bounds
+
+
+def _area(bounds: Bounds) -> float:
+    return (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
+
+
+def _shown_lights(lights: Sequence[SumoLight], states: pl.DataFrame | None) -> list[dict[str, Any]]:
+    """Heads of each light that was recorded, and when it showed which state."""
+    if states is None:
+        return []
+    heads = {light.id: _signal_heads(light) for light in lights}
+    return [
+        {
+            "heads": heads[light],
+            "times": own["time"].round(3).to_list(),
+            "states": own["state"].to_list(),
+        }
+        for (name,), own in states.group_by("light", maintain_order=True)
+        if heads.get(light := str(name))
+    ]
+
+
+def _signal_heads(light: SumoLight) -> list[list[Any]]:
+    """Place (cm), direction and letters of the state of each stop line of vehicles."""
+    places: dict[tuple[int, int], list[Any]] = {}
+    for letter, link in enumerate(light.links):
+        if link.crossed or len(link.path) < 2:
+            continue
+        (x, y), (ahead, beside) = link.path[0], link.path[1]
+        place = (round(x * _CENTIMETRES), round(y * _CENTIMETRES))
+        heading = round(math.atan2(beside - y, ahead - x), 2)
+        places.setdefault(place, [*place, heading, []])[3].append(letter)
+    return list(places.values())
+
+
+def _pieces_of(user: PlannedActor, own: pl.DataFrame) -> list[dict[str, Any]]:
+    """Stretches without a gap: first value and differences of x, y (cm) and heading."""
+    frame = own["frame"].to_numpy()
+    heading = np.unwrap(own["hdg"].to_numpy())
+    places = np.column_stack(
+        [
+            np.rint(own["x"].to_numpy() * _CENTIMETRES),
+            np.rint(own["y"].to_numpy() * _CENTIMETRES),
+            np.rint(heading * _STEPS_OF_HEADING),
+        ]
+    ).astype(np.int64)
+    breaks = np.flatnonzero(np.diff(frame) > 1) + 1
+    return [
+        {
+            "id": user.id, "category": user.category, "length": round(user.length, 2),
+            "width": round(user.width, 2), "frame": int(numbers[0]),
+            "moves": np.diff(part, axis=0, prepend=0).ravel().tolist(),
+        }
+        for numbers, part in zip(np.split(frame, breaks), np.split(places, breaks), strict=True)
+    ]  # fmt: skip
