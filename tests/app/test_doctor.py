@@ -130,6 +130,7 @@ def test_a_byte_that_has_changed_anywhere_is_named_by_report_and_compare(
         shutil.rmtree(run)
 
 
+@pytest.mark.slow
 def test_what_users_delete_to_save_room_is_not_damage(pair: RunPair, tmp_path: Path) -> None:
     run = tmp_path / "run"
     shutil.copytree(pair.finished, run)
@@ -164,6 +165,7 @@ def test_a_run_without_checksums_resumes_and_says_so_once(
     assert (run / "actors.json").read_bytes() == (pair.finished / "actors.json").read_bytes()
 
 
+@pytest.mark.slow
 def test_what_records_and_maps_say_is_rebuilt_to_the_same_bytes(
     pair: RunPair, tmp_path: Path
 ) -> None:

@@ -286,6 +286,7 @@ def test_bologna_runs_as_sumo_runs_it_with_its_seven_programs(
     assert not done.events().filter(pl.col("kind") == "route_changed").height
 
 
+@pytest.mark.slow
 def test_whom_sumo_ignores_in_a_route_file_is_named_and_not_planned(
     store: Workspace, project: Path
 ) -> None:
@@ -563,6 +564,7 @@ def odd_alone(odd_project: Path) -> Original:
     return run_of_sumo(odd_project, "odd.sumocfg", *command, net="../grid.net.xml")
 
 
+@pytest.mark.slow
 def test_packed_included_and_drawn_traffic_runs_as_in_sumo(
     odd_run: Run, odd_alone: Original
 ) -> None:

@@ -123,6 +123,7 @@ def test_the_first_screen(
         inspector.look("catalogue-empty")
 
 
+@pytest.mark.slow
 def test_the_catalogue(visit: Callable[..., Any], served: tool.Served, sampled: str) -> None:
     user, inspector = visit(served.url)
     user.open_catalogue()

@@ -44,6 +44,7 @@ def test_criteria_are_added_removed_and_taken_back_with_the_mouse(
     assert user.document()["criteria"] == ["collided == 0", "mean_delay <= 40 s"]
 
 
+@pytest.mark.slow
 def test_a_criterion_is_added_with_the_keyboard_alone(user: OdscenPage, crossing: str) -> None:
     user.open_editor(crossing)
     press(user, user.step("Criteria"))

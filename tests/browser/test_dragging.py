@@ -121,6 +121,7 @@ def test_a_goal_is_set_anywhere_and_its_flag_and_its_route_are_dragged_with_a_li
     assert away(cars.graph.place(passed), cars.graph.place(path[quarter + 3])) < 3
 
 
+@pytest.mark.slow
 def test_a_goal_that_cannot_be_reached_is_said_before_the_click_and_not_set(
     cars: OdscenPage,
 ) -> None:
@@ -165,6 +166,7 @@ def test_starts_and_goals_are_moved_by_keys_alone(cars: OdscenPage) -> None:
     assert cars.document()["actors"][1]["goal"] == goals[-1]
 
 
+@pytest.mark.slow
 def test_a_move_is_shown_before_it_is_saved_and_goes_back_where_there_is_no_server(
     cars: OdscenPage,
 ) -> None:

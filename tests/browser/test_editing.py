@@ -60,6 +60,7 @@ def test_a_region_grows_only_by_what_touches_it(editor: OdscenPage) -> None:
     assert editor.document()["roi"] == [arms[0]]
 
 
+@pytest.mark.slow
 def test_a_region_never_falls_apart(region: OdscenPage) -> None:
     before = region.document()["roi"]
     junction = region.graph.junction()

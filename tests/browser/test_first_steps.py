@@ -106,6 +106,7 @@ def test_a_map_that_cannot_be_read_is_said_in_sight_and_in_plain_words(user: Ods
     expect(said.locator("pre")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_a_change_that_takes_long_is_said_on_the_map(region: OdscenPage) -> None:
     region.step("Road users").click()
     region.kind("Car").click()

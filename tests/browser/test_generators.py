@@ -83,6 +83,7 @@ def test_the_generator_that_ships_and_an_own_one_with_options_fill_the_region(
     assert filling.document()["actors"] == many
 
 
+@pytest.mark.slow
 def test_what_a_generator_cannot_do_is_said_and_nothing_changes(filling: OdscenPage) -> None:
     before = filling.document()
     choose(filling, "Placed by", "Generator gone")

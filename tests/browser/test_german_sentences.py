@@ -42,6 +42,7 @@ def german(open_page: Callable[..., OdscenPage], served: Served) -> OdscenPage:
     return user
 
 
+@pytest.mark.slow
 def test_findings_and_a_refused_edit_are_in_german(
     german: OdscenPage, served: Served, sampled: str
 ) -> None:

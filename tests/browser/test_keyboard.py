@@ -81,6 +81,7 @@ def test_shortcuts_are_listed_and_the_list_gives_the_focus_back(
     expect(user.help).to_be_focused()
 
 
+@pytest.mark.slow
 def test_a_dialog_keeps_the_focus_and_escape_keeps_the_map(user: OdscenPage) -> None:
     user.open_catalogue()
     press(user, user.remove(CROSSING))

@@ -131,6 +131,7 @@ def test_nothing_hangs_at_the_pointer_while_measuring(user: OdscenPage, sampled:
     assert drawn(user) == empty
 
 
+@pytest.mark.slow
 def test_escape_closes_a_list_before_it_ends_the_measuring(user: OdscenPage, sampled: str) -> None:
     user.open_editor(sampled)
     x, y = user.map.view()[:2]

@@ -122,6 +122,7 @@ def test_a_turn_a_lane_and_a_point_are_picked_on_the_map(user: OdscenPage, cross
     assert incident["s"] > 1
 
 
+@pytest.mark.slow
 def test_a_place_that_is_not_on_the_map_is_refused_with_its_name(
     user: OdscenPage, crossing: str
 ) -> None:

@@ -43,6 +43,7 @@ def changes(user: OdscenPage) -> Locator:
     return user.page.get_by_role("list", name="Changes").get_by_role("listitem")
 
 
+@pytest.mark.slow
 def test_a_lane_is_widened_a_crosswalk_moved_a_turn_removed_and_all_undone(
     user: OdscenPage, served: Served
 ) -> None:
@@ -97,6 +98,7 @@ def test_a_lane_is_widened_a_crosswalk_moved_a_turn_removed_and_all_undone(
     assert Workspace.open(served.workspace).map(MENDED).read("xodr") == original
 
 
+@pytest.mark.slow
 def test_a_crosswalk_is_removed_by_keyboard_and_what_does_not_fit_is_said(
     user: OdscenPage,
 ) -> None:

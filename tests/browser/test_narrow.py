@@ -64,12 +64,13 @@ def test_lists_in_windows_of_all_sizes(viewer: OdscenPage, sampled: str) -> None
 
 
 @pytest.mark.slow
-def test_each_step_of_the_editor_in_windows_of_all_sizes(viewer: OdscenPage, sampled: str) -> None:
+@pytest.mark.parametrize("step", STEPS)
+def test_each_step_of_the_editor_in_windows_of_all_sizes(
+    viewer: OdscenPage, sampled: str, step: str
+) -> None:
     viewer.open_editor(sampled)
-    found = []
-    for step in STEPS:
-        viewer.step(step).click()
-        found += wrong(viewer, step)
+    viewer.step(step).click()
+    found = wrong(viewer, step)
     assert not found, "\n".join(found)
 
 

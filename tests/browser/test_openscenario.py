@@ -42,6 +42,7 @@ def drop(page: Page, files: Mapping[str, str]) -> None:
     page.evaluate(_DROP, [catalogue, packed])
 
 
+@pytest.mark.slow
 def test_a_dropped_scene_is_reported_edited_and_exported(
     served: tool.Served, open_page: Callable[..., OdscenPage]
 ) -> None:

@@ -36,6 +36,7 @@ def choose_scene(page: Page, words: str) -> None:
     page.get_by_role("list", name="Scenes").get_by_role("button", name=words).first.click()
 
 
+@pytest.mark.slow
 def test_a_dropped_recording_becomes_a_scene_that_is_run_and_judged(opened: OdscenPage) -> None:
     page = opened.page
     side = page.get_by_role("region", name="The recording", exact=True)
@@ -66,6 +67,7 @@ def test_a_dropped_recording_becomes_a_scene_that_is_run_and_judged(opened: Odsc
     assert actions["pointer"] <= MOST_CLICKS
 
 
+@pytest.mark.slow
 def test_the_time_bar_shows_who_is_where_and_the_mouse_chooses_part_and_ego(
     opened: OdscenPage,
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from playwright.sync_api import Locator, expect
 
 from tests.browser.pages import OdscenPage
@@ -15,6 +16,7 @@ def run_of_head(user: OdscenPage) -> Locator:
     return user.page.get_by_role("banner").get_by_role("button", name="Run", exact=True)
 
 
+@pytest.mark.slow
 def test_all_steps_and_run_are_in_sight_and_one_click_runs(user: OdscenPage, sampled: str) -> None:
     user.page.set_viewport_size({"width": 1440, "height": HIGH})
     user.open_editor(sampled)
@@ -42,6 +44,7 @@ def test_a_click_on_a_signal_in_the_step_of_the_region_keeps_its_junction(
     assert user.document()["roi"] == before
 
 
+@pytest.mark.slow
 def test_run_says_what_hinders_it(user: OdscenPage) -> None:
     user.open_catalogue()
     user.new_scenario("signal_crossing").click()

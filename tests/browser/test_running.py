@@ -60,6 +60,7 @@ def test_a_run_is_held_stepped_and_sped_up_and_the_scenario_stays_as_it_is(
     assert user.document() == before
 
 
+@pytest.mark.slow
 def test_a_stopped_run_shows_what_there_is(user: OdscenPage, sampled: str) -> None:
     start(user, sampled)
     user.control("Stop").click()

@@ -106,6 +106,7 @@ def test_times_and_a_cordon_are_set_with_the_keyboard_alone(
     assert user.actions()["pointer"] == 0
 
 
+@pytest.mark.slow
 def test_a_station_where_there_is_no_lane_is_refused_with_the_name_of_the_node(
     user: OdscenPage, crossing: str
 ) -> None:

@@ -36,6 +36,7 @@ def drop_project(user: OdscenPage, project: Path) -> None:
     user.wait_for_editor()
 
 
+@pytest.mark.slow
 def test_a_dropped_project_has_its_map_and_runs_with_its_own_files(
     user: OdscenPage,
     served: Served,

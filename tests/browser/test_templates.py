@@ -34,6 +34,7 @@ def test_a_newcomer_places_the_walker_by_mouse(
     assert [actor["id"] for actor in document["actors"]] == ["ego", "walker"]
 
 
+@pytest.mark.slow
 def test_a_template_is_placed_by_keyboard_and_says_why_it_has_no_room(
     served: tool.Served, open_page: Callable[..., OdscenPage]
 ) -> None:

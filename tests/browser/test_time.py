@@ -62,6 +62,7 @@ def test_a_departure_is_dragged_and_moved_by_keys_and_undo_brings_it_back(
     assert timed.map.area.get_attribute("data-view") == view
 
 
+@pytest.mark.slow
 def test_the_plan_is_shown_at_a_moment_before_any_run_and_says_that_it_is_one(
     timed: OdscenPage,
 ) -> None:

@@ -154,6 +154,7 @@ def test_a_day_on_the_whole_map_is_generated_and_its_load_on_the_junctions_repor
     assert sum(row[2] for row in document["demand"]["matrices"][0]["trips"]) > 350
 
 
+@pytest.mark.slow
 def test_a_flow_can_have_a_day_profile(user: OdscenPage, crossing: str, served: Served) -> None:
     workspace = Workspace.open(served.workspace)
     loaded = load_map(workspace.map(CROSSING))

@@ -276,6 +276,7 @@ def short_run(workspace, scenario, tmp_path_factory):
     return run_folder(out, scenario)
 
 
+@pytest.mark.slow
 def test_an_export_onto_a_full_disk_says_so_in_our_words(workspace, short_run, tmp_path):
     (tmp_path / f"{short_run.name}.npz").symlink_to("/dev/full")
     done = odscen("export", short_run, "--to", "pyg", "--workspace", workspace, "--out", tmp_path)
@@ -311,6 +312,7 @@ def test_a_closed_or_full_stream_changes_no_exit_code(tmp_path, streams, code):
     assert b"Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_with_closed_streams_nothing_is_written_into_other_files(workspace, scenario, tmp_path):
     words = (
         f"{sys.executable} -m odscen run {scenario} --until 2 --workspace {workspace} "
@@ -322,6 +324,7 @@ def test_with_closed_streams_nothing_is_written_into_other_files(workspace, scen
     assert subprocess.run(sums, check=False, cwd=run).returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["run", "export", "compare"])
 def test_too_little_address_space_is_said_before_a_library_aborts(
     workspace, scenario, short_run, tmp_path, command

@@ -196,6 +196,7 @@ def test_verify_refuses_a_network_that_is_none(workspace, tmp_path):
     assert done.json["error"]["file"] == "net.net.xml"
 
 
+@pytest.mark.slow
 def test_add_warns_of_a_network_that_does_not_follow_its_map_and_sampling_says_what_is_wrong(
     tmp_path,
 ):

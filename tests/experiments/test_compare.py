@@ -60,6 +60,7 @@ def sides(tmp_path_factory):
     return root / "a", root / "b"
 
 
+@pytest.mark.slow
 def test_a_longer_green_is_a_clear_difference_at_its_junction(sides):
     a, b = sides
     result = compare_runs(read_runs(a), read_runs(b))

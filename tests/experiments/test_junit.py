@@ -24,6 +24,7 @@ def properties(element):
     return {one.get("name"): one.get("value") for one in element.iter("property")}
 
 
+@pytest.mark.slow
 def test_scenarios_and_runs_are_test_cases_and_the_counts_are_theirs(root):
     names = [one.get("name") for one in root.iter("testcase")]
     assert names == [

@@ -70,6 +70,7 @@ def swept(cut_in: Scenario, tmp_path_factory: pytest.TempPathFactory) -> Sweep:
     )
 
 
+@pytest.mark.slow
 def test_each_case_is_a_row_with_its_outcome(swept: Sweep) -> None:
     table = swept.table
     assert table["case"].to_list() == ["case-001", "case-002", "case-003", "case-004"]

@@ -298,6 +298,7 @@ def exported(name: str, folder: Path) -> tuple[Any, dict[str, Any]]:
     return etree.parse(file).getroot(), json.loads(notes.read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
 @pytest.mark.parametrize("name", [*TEMPLATES, "every rule", "as run"])
 def test_scenario_runner_takes_it(rule: Callable[[Any], bool], name: str, folder: Path) -> None:

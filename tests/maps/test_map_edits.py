@@ -195,6 +195,7 @@ def test_places_in_degrees_find_the_same_lane_where_the_map_has_another_origin()
     assert model.roads[RoadId("2")].sections[0].lanes[1].speeds[0].max == pytest.approx(30 / 3.6)
 
 
+@pytest.mark.slow
 def test_a_mended_map_keeps_its_edits_holds_verify_and_has_them_again_from_a_new_file(
     tmp_path: Path,
 ) -> None:

@@ -26,6 +26,7 @@ def country(tmp_path_factory: pytest.TempPathFactory) -> WholeMap:
     return whole_map(Workspace.open(folder).add_map(MAPS / "rural_hills.xodr"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_km", [4, 40])
 def test_a_road_in_the_country_has_as_many_vehicles_as_are_wanted(
     country: WholeMap, per_km: int

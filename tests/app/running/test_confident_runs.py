@@ -35,6 +35,7 @@ def test_the_interval_of_a_difference_is_students_and_the_seeds_needed_are_the_f
     assert "too few" in confidence_of([3.0], share=0.05).words
 
 
+@pytest.mark.slow
 def test_an_interval_covers_the_mean_of_a_figure_that_a_few_runs_break_down_in() -> None:
     """Delays as near saturation: of 5 seeds Student's covers in 91 % of cases, this one in 95 %."""
     rng = np.random.default_rng(7)

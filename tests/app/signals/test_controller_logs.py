@@ -93,6 +93,7 @@ def greens_shown(folder: Path, link: int, until: float) -> list[tuple[float, flo
     return found
 
 
+@pytest.mark.slow
 def test_a_light_is_green_when_the_log_says(store: Workspace, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(made_log(600.0))
     played, notes = play_controller_log(

@@ -43,6 +43,7 @@ def town(workspace: Workspace) -> Scenario:
     return edits.new_scenario(graph, name="town", roi=graph.segments.ids, seed=1)
 
 
+@pytest.mark.slow
 def test_lights_of_a_road_get_one_cycle_and_offsets_with_the_bands_that_are_reported(
     workspace: Workspace, town: Scenario
 ) -> None:

@@ -160,6 +160,7 @@ def test_an_ego_that_runs_through_a_column_in_a_junction_collides_and_that_is_re
     assert result.summary["actors"]["collided"] >= 2
 
 
+@pytest.mark.slow
 def test_an_ego_of_ours_waits_for_a_driver_and_is_taken_away(
     workspace: Workspace, tmp_path: Path
 ) -> None:

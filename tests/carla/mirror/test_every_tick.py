@@ -168,6 +168,7 @@ def assert_exact(off: dict[str, list[float]], frames: int) -> None:
         assert max(off[kind]) <= limit, kind
 
 
+@pytest.mark.slow
 def test_a_level_town_is_shown_exactly_in_every_tick(
     workspace: Workspace, sample: Sample, tmp_path: Path
 ) -> None:

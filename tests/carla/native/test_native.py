@@ -66,6 +66,7 @@ def words_of(scenario: Scenario) -> list[str]:
     return [words for _, words in left_out(scenario)]
 
 
+@pytest.mark.slow
 def test_what_carla_alone_does_not_do_of_rules_is_said(sample: Sample) -> None:
     scenario = read_scenario(sample(TOWN, seed=3))
     name = scenario.actors[0].id

@@ -122,6 +122,7 @@ def test_vehicles_share_the_lanes_and_keep_a_headway() -> None:
             assert gaps.std() > 0.5
 
 
+@pytest.mark.slow
 def test_arrivals_of_many_seeds_scatter_as_poisson_does() -> None:
     """Variance over mean of the vehicles of a quarter of an hour is 1, from seed to seed."""
 

@@ -40,6 +40,7 @@ def movements(run: Path) -> pl.DataFrame:
     return over_run(figures.movements)
 
 
+@pytest.mark.slow
 def test_the_busiest_way_goes_through_several_junctions_that_follow_each_other(run: Path) -> None:
     graph = built(NAME).sumo.graph
     turns = movements(run)

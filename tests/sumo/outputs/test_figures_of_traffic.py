@@ -202,6 +202,7 @@ def of(table: pl.DataFrame, **key: str) -> dict[str, float]:
     return over_run(table).row(by_predicate=col(name) == value, named=True)
 
 
+@pytest.mark.slow
 def test_delay_and_travel_time_are_those_of_tripinfo(run):
     network = over_run(run.figures.network).row(0, named=True)
     assert network["vehicles"] == network["departed"] == network["arrived"] == NUMBER

@@ -145,6 +145,7 @@ def edie(
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_density_speed_and_level_of_each_segment_are_edies_and_hcms(motorway: Motorway) -> None:
     both = motorway.figures.join(motorway.edie, on="segment", suffix="_edie")
     busy = both.filter(col("vehicles") > 200)

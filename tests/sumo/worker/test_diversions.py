@@ -121,6 +121,7 @@ def test_nobody_enters_a_closed_road_and_the_parallel_roads_get_more(
     assert shut.summary["actors"]["stranded"] == 0
 
 
+@pytest.mark.slow
 def test_a_closure_between_two_steps_ends_as_well(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:

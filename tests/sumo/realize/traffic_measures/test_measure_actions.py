@@ -44,6 +44,7 @@ def xml(one: MeasureActions) -> etree._Element:
     return etree.fromstring(one.xml.encode())
 
 
+@pytest.mark.slow
 def test_without_measures_nothing_is_written(town: LoadedMap) -> None:
     assert actions(town) == MeasureActions()
     late = {"kind": "closure", "places": ["r25"], "begin": 600.0}

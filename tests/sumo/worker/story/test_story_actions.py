@@ -59,6 +59,7 @@ def test_a_cut_in_ends_in_the_lane_of_the_other_with_the_gap_that_was_asked_for(
     assert van.y[van.time < end] == pytest.approx(wanted[van.time < end], abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_gap_that_cannot_be_reached_in_time_is_said(tmp_path: Path) -> None:
     actors = [fast("ego", 500.0, MIDDLE, ego=True), fast("van", 370.0, RIGHT)]
     rules = [after(1.0, {"cut_in": {"to": "ego", "gap": 10.0, "over": 1.0}})]
