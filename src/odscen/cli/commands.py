@@ -55,6 +55,7 @@ _COMMANDS = {
     "run": "run_commands:run",
     "resume": "run_commands:resume",
     "report": "report_command:report",
+    "calibrate": "calibrate_command:calibrate",
     "sweep": "sweep_command:sweep",
     "dataset": "study_commands:dataset",
     "search": "sweep_command:search",

@@ -129,6 +129,17 @@ def read_counts(text: str, *, clock: float = 0.0) -> Rows[CountRow]:
     )
 
 
+def read_target_lines(text: str) -> Iterator[_TableLine]:
+    """Yield the lines of a table of targets, see :mod:`odscen.scenario.demand.targets`.
+
+    Raises
+    ------
+    InputError
+        With the line and the value that cannot be used.
+    """
+    return _read_lines(text, ("kind", "place", "begin", "end", "value"), ("use",))
+
+
 def read_inputs(text: str, *, clock: float = 0.0) -> tuple[InputRow, ...]:
     """Read vehicle inputs: ``segment``, perhaps ``direction``, then a column for each time slice.
 

@@ -116,7 +116,7 @@ def with_green(
     ScenarioError
         If the green of this stage, or of the next one, becomes too short.
     """
-    stages = _stages_in_plan(timing, light, plan)
+    stages = stages_in_plan(timing, light, plan)
     old = {stage.id: stage.green for stage in stages}
     if stage not in old:
         raise NotFoundError(f"stage of the light of junction {timing.junction!r}", stage, list(old))
@@ -163,10 +163,18 @@ def _refuse_short(
     raise ScenarioError(msg)
 
 
-def _stages_in_plan(
+def stages_in_plan(
     timing: JunctionTiming, light: Light, plan: str | None
 ) -> tuple[PlannedStage, ...]:
-    """Stages with their greens in one plan; of a light with the map's stages those."""
+    """Stages with their greens in one plan; of a light with the map's stages those.
+
+    Raises
+    ------
+    InputError
+        If the program has plans of the day and none is named.
+    NotFoundError
+        If there is no such plan.
+    """
     if timing.stages:
         designed = DesignedProgram(timing, light, "fixed").plans()
         if timing.plans:
