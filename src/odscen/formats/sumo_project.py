@@ -10,7 +10,6 @@ Source: sumo.dlr.de/docs/Basics/Using_the_Command_Line_Applications.html, "Confi
 from __future__ import annotations
 
 import re
-import zlib
 from collections import Counter
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
@@ -23,6 +22,7 @@ from scipy.sparse.csgraph import connected_components
 from odscen.base.errors import InputError, in_file
 from odscen.base.given_files import MOST
 from odscen.base.shown import shown
+from odscen.base.unpacking import GZIP, unpack_gzip
 from odscen.base.xml_reading import read_xml
 from odscen.formats.base import ElementReport, FileContent
 from odscen.lanegraph.query import node_id
@@ -126,15 +126,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
 
 
 def _unpack_content(content: bytes) -> bytes:
-    if not content.startswith(b"\x1f\x8b"):
-        return content
-    try:
-        found = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16).decompress(content, MOST + 1)
-    except zlib.error as error:
-        raise InputError(f"this is no gzip file that can be read: {error}") from error
-    if len(found) > MOST:
-        raise InputError(f"unpacked, the file has more than {MOST} bytes")
-    return found
+    return unpack_gzip(content, most=MOST) if content.startswith(GZIP) else content
 
 
 def _words_for(root: str) -> str:

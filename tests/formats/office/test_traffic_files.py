@@ -326,7 +326,7 @@ def test_columns_can_be_said() -> None:
         (b"<additional><edgeData id='a' file='b'/></additional>", "import the file that it names"),
         (b'{"type": "FeatureCollection"}', "this is JSON"),
         (b"PK\x03\x04 broken", "no Excel file that can be read"),
-        (b"\x1f\x8b broken", "no gzip file that can be read"),
+        (b"\x1f\x8b broken", "the packed file is damaged"),
         (b"abc\x00\x01\x02", "this is no text"),
         (b"hello\nworld\n", "this is no table"),
         (

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import gzip
-import zlib
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError
 from odscen.base.given_files import MOST
+from odscen.base.unpacking import unpack_gzip
 from odscen.base.xml_reading import read_xml
 from odscen.formats.controller_log import is_controller_log
 from odscen.formats.office.free_table import (
@@ -65,7 +64,7 @@ def _read_any(
     if not content.strip():
         raise InputError("the file is empty")
     if content.startswith(b"\x1f\x8b"):
-        content = _unpack_content(content)
+        content = unpack_gzip(content, most=MOST)
     if content.startswith((b"PK\x03\x04", _OLE)):
         return _read_table(table_of_sheet(content), options, known_columns)
     if content.startswith(b"BI") and b"\x00" in content[:64]:
@@ -97,13 +96,3 @@ def _read_table(
     if not options.columns:
         options = ReadingOptions(kept, options.interval, options.date, options.time_zone)
     return FreeTable(table, options).read()
-
-
-def _unpack_content(content: bytes) -> bytes:
-    try:
-        found = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16).decompress(content, MOST + 1)
-    except (zlib.error, gzip.BadGzipFile, EOFError) as error:
-        raise InputError(f"this is no gzip file that can be read: {error}") from error
-    if len(found) > MOST:
-        raise InputError(f"unpacked, the file has more than {MOST} bytes")
-    return found

@@ -5,14 +5,13 @@ See https://wiki.openstreetmap.org/wiki/OSM_XML and https://wiki.openstreetmap.o
 
 from __future__ import annotations
 
-import bz2
 import math
 import re
-import zlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.errors import InputError, LimitError
+from odscen.base.unpacking import unpack_parts
 from odscen.base.xml_reading import read_xml
 from odscen.maps.importers.file_kinds import root_element
 
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
 MOST_UNPACKED = 1 << 30
 """Bytes that a packed file may unpack to."""
-_CHUNK = 1 << 20
 _HEAD = 1 << 16
 _LANELET2 = re.compile(rb"""v=["'](?:lanelet|regulatory_element)["']""")
 _PBF_HEAD = b"OSMHeader"
@@ -114,34 +112,6 @@ def _take_head(parts: Iterator[bytes]) -> Iterator[bytes]:
         size += len(part)
         if size >= _HEAD:
             return
-
-
-def unpack_parts(content: bytes) -> Iterator[bytes]:
-    """Unpack gzip or bzip2 in parts of at most a megabyte, all members of the file.
-
-    Raises
-    ------
-    InputError
-        If it is damaged or cut off.
-    """
-    is_gzip = content.startswith(b"\x1f\x8b")
-    rest = content
-    while rest:
-        unpacker = zlib.decompressobj(wbits=31) if is_gzip else bz2.BZ2Decompressor()
-        data = rest
-        try:
-            while not unpacker.eof:
-                part = unpacker.decompress(data, _CHUNK)
-                data = unpacker.unconsumed_tail if is_gzip else b""  # type: ignore[union-attr]
-                if part:
-                    yield part
-                elif unpacker.eof:
-                    break
-                elif is_gzip or unpacker.needs_input:  # type: ignore[union-attr]
-                    raise InputError("the packed file is cut off; download it again")
-        except (zlib.error, OSError, ValueError) as error:
-            raise InputError(f"the packed file is damaged: {error}") from error
-        rest = unpacker.unused_data.lstrip(b"\0")
 
 
 def read_extract(content: bytes) -> Extract:
