@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from odscen.app.demand.calibration import Measured, calibrate
+from odscen.app.demand.calibration import calibrate
 from odscen.app.demand.calibration_page import write_calibration_page
 from odscen.app.demand.plausible_calibration import doubts_of
-from odscen.app.demand.target_values import is_group_of, read_values
+from odscen.app.demand.target_values import Measured, is_group_of, read_values
 from odscen.app.maps import load_map
 from odscen.app.running.runs import run
 from odscen.base.errors import InputError

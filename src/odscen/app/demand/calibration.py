@@ -22,6 +22,7 @@ from odscen.app.demand.calibration_knobs import (
 from odscen.app.demand.demand_correction import correct_matrix
 from odscen.app.demand.plausible_calibration import doubts_of
 from odscen.app.demand.target_values import (
+    Measured,
     common_interval,
     read_values,
     refuse_unknown_places,
@@ -258,18 +259,6 @@ def calibrate(
         found.scenario, fits, distances, tuple(work.steps), tuple(work.skipped),
         (*doubts, *found.doubts), work.runs,
     )  # fmt: skip
-
-
-class Measured(NamedTuple):
-    """What runs show: a value for each target, vehicles of a run, and verdicts that are not good.
-
-    ``passages`` are the vehicles at all flow targets together, mean over the seeds.
-    """
-
-    values: tuple[float | None, ...]
-    vehicles: float
-    passages: float
-    verdicts: tuple[str, ...]
 
 
 @dataclass(slots=True)

@@ -11,7 +11,7 @@ from odscen.scenario.demand.targets import FLOW
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from odscen.app.demand.calibration import Measured
+    from odscen.app.demand.target_values import Measured
     from odscen.scenario.demand.targets import Target
     from odscen.scenario.document.scenario_document import Scenario
 

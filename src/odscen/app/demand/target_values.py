@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from odscen.base.errors import InputError
 from odscen.runs.recorded import trajectory_files
@@ -21,6 +21,18 @@ if TYPE_CHECKING:
 
 SHORTEST: Final = 60.0
 """Seconds of a slice of travel times and queues, at least."""
+
+
+class Measured(NamedTuple):
+    """What runs show: a value for each target, vehicles of a run, and verdicts that are not good.
+
+    ``passages`` are the vehicles at all flow targets together, mean over the seeds.
+    """
+
+    values: tuple[float | None, ...]
+    vehicles: float
+    passages: float
+    verdicts: tuple[str, ...]
 
 
 def read_values(
