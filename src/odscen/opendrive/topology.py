@@ -8,7 +8,10 @@ with the driving direction of both lanes are given.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
+import math
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+
+import numpy as np
 
 from odscen.base.ids import LaneKey, RoadId
 from odscen.opendrive.lanes import is_forward
@@ -17,6 +20,7 @@ from odscen.opendrive.road_model import CLOSED_TYPES, DRIVABLE_TYPES, lane_use
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
+    from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.road_model import (
         Connection,
         ContactPoint,
@@ -251,6 +255,51 @@ def cut_off_lanes(odr: OpenDrive) -> frozenset[LaneKey]:
         if odr.roads[key.road].junction is not None
         and lane_use(odr.roads[key.road].sections[key.section].lanes[key.lane]) in DRIVABLE_TYPES
         and (all_closed(before[key]) or all_closed(following))
+    )
+
+
+LONGEST_FOLD: Final = 12.0
+"""Metres of a connecting lane that only leads back, at most."""
+
+_REVERSED: Final = -0.9
+"""Cosine between two directions, at most, if one is the reverse of the other."""
+
+
+def folded_lanes(odr: OpenDrive, table: RoadTable) -> frozenset[LaneKey]:
+    """Short connecting lanes that lead back, against all lanes before and behind them.
+
+    Converters write them where the edges that they had overlap: who would follow such a lane drives
+    past the start of the next road, and in reverse to it.
+    """
+    successors = lane_successors(odr)
+    before: dict[LaneKey, list[LaneKey]] = {key: [] for key in successors}
+    for here, following in successors.items():
+        for there in following:
+            before[there].append(here)
+    chosen = [
+        key
+        for key, following in successors.items()
+        if odr.roads[key.road].junction is not None
+        and odr.roads[key.road].length <= LONGEST_FOLD
+        and following
+        and before[key]
+        and lane_use(odr.roads[key.road].sections[key.section].lanes[key.lane]) in DRIVABLE_TYPES
+    ]
+    near = {*chosen, *(k for key in chosen for k in (*before[key], *successors[key]))}
+    rows = np.array([table.lane_index[key] for key in near], dtype=np.int64)
+    if not len(rows):
+        return frozenset()
+    forward = table.lane_forward[rows]
+    first = np.where(forward, table.lane_s0[rows], table.lane_s1[rows])
+    last = np.where(forward, table.lane_s1[rows], table.lane_s0[rows])
+    turned = np.where(forward, 0.0, np.pi)
+    starts = dict(zip(near, table.lane_points(rows, first).hdg + turned, strict=True))
+    ends = dict(zip(near, table.lane_points(rows, last).hdg + turned, strict=True))
+    return frozenset(
+        key
+        for key in chosen
+        if all(math.cos(starts[key] - ends[other]) < _REVERSED for other in before[key])
+        and all(math.cos(starts[other] - ends[key]) < _REVERSED for other in successors[key])
     )
 
 

@@ -108,15 +108,34 @@ def test_a_short_road_with_crosswalks_at_both_ends_keeps_its_junctions_and_light
     assert not [entry for entry in network.report.entries if entry.outcome == "lost"]
 
 
-def test_crosswalks_that_leave_no_road_between_them_join_the_junctions() -> None:
-    network = two_junctions(6.0, (1.6, 4.4))
-    junctions = {one.from_junction for one in network.table.edges.values()}
-    assert "J10" in junctions
-    assert "J20" not in junctions
-    assert network.report.figures["crossings"] == 2
-    # Who comes over the road, each way, is what its lights are for: no road is left before them.
-    (light,) = network.table.lights
-    assert {name for names in light.signals for name in names} == {"71", "72"}
+@pytest.mark.parametrize(
+    ("length", "crosswalks", "least"),
+    [
+        (6.0, (1.6, 4.4), 0.99),
+        (4.6, (0.0, 4.6), 0.99),
+        (4.6, (1.0, 2.0), 0.25),
+        (2.9, (0.0,), 0.25),
+        (2.9, (2.8,), 0.25),
+        (1.4, (0.1,), 0.25),
+        (0.2, (0.0,), 0.1),
+        (0.3, (0.0, 0.3), 0.1),
+    ],
+)
+def test_a_road_that_all_lies_under_crosswalks_keeps_an_edge_between_its_junctions(
+    length: float, crosswalks: tuple[float, ...], least: float
+) -> None:
+    network = two_junctions(length, crosswalks)
+    ways = {
+        (one.from_junction, one.to_junction): one.length
+        for one in network.table.edges.values()
+        if one.id.startswith("2.") and one.function == "normal"
+    }
+    assert sorted(ways) == [("J10", "J20"), ("J20", "J10")]
+    assert min(ways.values()) >= least
+    assert network.report.figures["crossings"] == len(crosswalks)
+    # The crossings belong to the junctions, and to no place of their own.
+    names = {one.from_junction for one in network.table.edges.values() if one.from_junction}
+    assert not [name for name in names if name.startswith("X")]
     assert not [entry for entry in network.report.entries if entry.outcome == "lost"]
 
 

@@ -51,7 +51,7 @@ from odscen.convert.pedestrian.pedestrian_network import build_walks
 from odscen.convert.signals.map_signals import signal_control
 from odscen.convert.signals.road_lights import cut_for_lights
 from odscen.opendrive.objects import signal_kind
-from odscen.opendrive.topology import lane_successors, side_links
+from odscen.opendrive.topology import folded_lanes, lane_successors, side_links
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -244,12 +244,14 @@ def build_network(odr: OpenDrive, table: RoadTable, walks: PedestrianGraph) -> S
     lefthand = _keeps_left(table)
     successors = lane_successors(odr)
     sides = side_links(odr)
+    folded = folded_lanes(odr, table)
     crosswalks, under = place_crosswalks(odr, table)
     gaps: Mapping[RoadId, Sequence[RoadGap]] = merge_gaps(odr, under, side_gaps(sides))
     stops: Mapping[Acting, RoadStop] = {}
     while True:
         plans = plan_edges(odr, table, successors, gaps, lefthand=lefthand)
-        found = _open_connections(odr, table, find_connections(table, successors, plans, sides))
+        followed = find_connections(table, successors, plans, sides, folded)
+        found = _open_connections(odr, table, followed)
         nodes = find_nodes(odr, table, found, gaps, crosswalks, sides)
         on_foot = build_walks(walks, table, crosswalks, nodes.crosswalks)
         builder = _NetworkBuilder(odr, table, found, nodes, on_foot, stops, lefthand=lefthand)

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from scipy.cluster.hierarchy import DisjointSet
 
-from odscen.base.ids import RoadId
+from odscen.base.ids import JunctionId, RoadId
 from odscen.convert.model.connections import NodeKey, first_members, join_groups
-from odscen.convert.model.edge_plan import LEAST_EDGE
+from odscen.convert.model.edge_plan import LEAST_EDGE, is_between_junctions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from odscen.base.ids import JunctionId
     from odscen.convert.model.connections import PlannedConnections
     from odscen.convert.model.edge_plan import RoadGap
     from odscen.convert.pedestrian.crosswalks import PlacedCrosswalk
@@ -120,12 +119,21 @@ def _join_crosswalk(
 ) -> NodeKey:
     own: NodeKey = ("crosswalk", number)
     groups.add(own)
-    for road_id in placed.connecting:
-        join_groups(groups, ("junction", odr.roads[road_id].junction), own)
+    junctions = dict.fromkeys(odr.roads[road_id].junction for road_id in placed.connecting)
     for road_id, s in placed.roads:
-        for gap in gaps[road_id]:
-            if gap.start <= s <= gap.end:
-                join_groups(groups, _port_at(odr.roads[road_id], gap.start), own)
+        road = odr.roads[road_id]
+        over = [gap for gap in gaps[road_id] if gap.start <= s <= gap.end]
+        # A road that all lies under crosswalks keeps an edge: they belong to the nearer end of it.
+        for gap in over or [min(gaps[road_id], key=lambda g: max(g.start - s, s - g.end))]:
+            port = _port_at(road, gap.start)
+            join_groups(groups, port, own)
+            # Its own edge keeps both junctions apart, even if the crosswalk reaches over both.
+            if len(junctions) > 1 and is_between_junctions(road):
+                link = road.predecessor if port[-1] == "start" else road.successor
+                if link is not None and link.element_id in junctions:
+                    junctions = {JunctionId(link.element_id): None}
+    for junction in junctions:
+        join_groups(groups, ("junction", junction), own)
     return own
 
 

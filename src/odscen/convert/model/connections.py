@@ -6,16 +6,19 @@ and over stretches too short for an edge; SUMO gets one internal lane for each.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from odscen.convert.model.access import allowed
 from odscen.convert.model.edge_plan import LEAST_EDGE
-from odscen.convert.model.lane_alignment import LaneAlignment, Stretch
+from odscen.convert.model.lane_alignment import DENSE, LaneAlignment, Stretch
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from scipy.cluster.hierarchy import DisjointSet
 
@@ -29,6 +32,9 @@ NodeKey = tuple[object, ...]
 
 MOST_LANES = 400
 """Lanes under one connection; more is a circle in a file that links a junction to itself."""
+
+_STEP_BACK = 0.05
+"""Metres; converters round places by less."""
 
 MOST_CONNECTIONS = 2_000
 """Connections from one lane; a file with more has junctions that only consist of junctions."""
@@ -75,17 +81,20 @@ def find_connections(
     successors: Mapping[LaneKey, Sequence[LaneKey]],
     edges: Sequence[EdgePlan],
     sides: Sequence[SideLink] = (),
+    folded: Collection[LaneKey] = (),
 ) -> PlannedConnections:
     """Follow the lanes of all edges to where the next edges begin, side links included.
 
     Where several connections lead from one lane to the same other lane, the shortest is taken.
+    Lanes that are ``folded`` (:func:`odscen.opendrive.topology.folded_lanes`) are passed over.
     """
     finder = _ConnectionFinder(table, successors, edges, sides)
     found: list[PlannedConnection] = []
     for number, edge in enumerate(edges):
         for index in range(len(edge.lanes)):
             found += finder.connections_from(number, index)
-    plans, connections = _with_room(edges, found)
+    found, overlaps = _without_folds(table, edges, found, folded)
+    plans, connections = _with_room(edges, found, overlaps)
     return PlannedConnections(plans, connections, tuple(finder.lost))
 
 
@@ -199,31 +208,108 @@ def _alignment_length(alignment: LaneAlignment) -> float:
     return sum(stretch.extent for stretch in alignment)
 
 
+def _without_folds(
+    table: RoadTable,
+    edges: Sequence[EdgePlan],
+    connections: Sequence[PlannedConnection],
+    folded: Collection[LaneKey],
+) -> tuple[list[PlannedConnection], dict[tuple[int, int], float]]:
+    """Leave out lanes that lead back, and cut what lies before them where the next lane begins.
+
+    Returns
+    -------
+    The connections, and for those of them without a lane of their own (by source and target edge)
+    metres by which the source ends behind the start of the target.
+    """
+    rows = {table.lane_index[key] for key in folded}
+    straight: list[PlannedConnection] = []
+    overlaps: dict[tuple[int, int], float] = {}
+    for connection in connections:
+        if any(stretch.row in rows for stretch in connection.alignment):
+            leaving = edges[connection.source].lanes[connection.source_lane].alignment[-1]
+            arriving = edges[connection.target].lanes[connection.target_lane].alignment[0]
+            kept: list[Stretch] = []
+            joins = False
+            for stretch in (*connection.alignment, arriving):
+                if stretch.row in rows:
+                    joins = True
+                    continue
+                if joins:
+                    _cut_before(table, kept, stretch)
+                joins = False
+                kept.append(stretch)
+            straight.append(connection._replace(alignment=tuple(kept[:-1])))
+            if len(kept) == 1:
+                back = max(0.0, _metres_back(table, leaving, arriving))
+                key = (connection.source, connection.target)
+                overlaps[key] = max(overlaps.get(key, 0.0), back)
+        else:
+            straight.append(connection)
+    return straight, overlaps
+
+
+def _metres_back(table: RoadTable, stretch: Stretch, following: Stretch) -> float:
+    """Metres that a stretch ends behind the start of another one, in its own direction."""
+    rows = np.array([stretch.row, following.row], dtype=np.int64)
+    places = table.lane_points(rows, np.array([stretch.end, following.start]))
+    away = (float(places.x[1] - places.x[0]), float(places.y[1] - places.y[0]))
+    sense = 1.0 if stretch.end >= stretch.start else -1.0
+    heading = float(places.hdg[0])
+    return -sense * (away[0] * math.cos(heading) + away[1] * math.sin(heading))
+
+
+def _cut_before(table: RoadTable, kept: list[Stretch], following: Stretch) -> None:
+    """Cut the last stretches where the following one starts; those all behind it are dropped."""
+    while kept:
+        stretch = kept[-1]
+        back = _metres_back(table, stretch, following)
+        if back <= _STEP_BACK:
+            return
+        kept.pop()
+        if stretch.extent - back >= DENSE:
+            sense = 1.0 if stretch.end > stretch.start else -1.0
+            kept.append(stretch._replace(end=stretch.end - sense * back))
+            return
+
+
 def _with_room(
-    edges: Sequence[EdgePlan], connections: Sequence[PlannedConnection]
+    edges: Sequence[EdgePlan],
+    connections: Sequence[PlannedConnection],
+    overlaps: Mapping[tuple[int, int], float],
 ) -> tuple[tuple[EdgePlan, ...], tuple[PlannedConnection, ...]]:
-    """Give connections of no length the last decimetre of the edge before, for internal lanes."""
+    """Give connections of no length the last decimetre of the edge before, for internal lanes.
+
+    Where the next edge begins before the end of that edge (``overlaps``), as much more.
+    """
     short = {c.source for c in connections if _alignment_length(c.alignment) < LEAST_EDGE}
     plans = list(edges)
     rests: dict[tuple[int, int], Stretch] = {}
     for number in sorted(short):
         plan = plans[number]
+        over = max((back for key, back in overlaps.items() if key[0] == number), default=0.0)
         lanes = []
         for index, lane in enumerate(plan.lanes):
             last = lane.alignment[-1]
-            room = min(LEAST_EDGE, last.extent / 3.0)
+            room = min(over + LEAST_EDGE, last.extent / 3.0)
             cut = last.end - room if last.end > last.start else last.end + room
             rests[number, index] = Stretch(last.row, cut, last.end)
             lanes.append(
                 replace(lane, alignment=(*lane.alignment[:-1], Stretch(last.row, last.start, cut)))
             )
         plans[number] = replace(plan, lanes=tuple(lanes))
-    longer = [
-        c._replace(alignment=_join_alignments(rests[c.source, c.source_lane], c.alignment))
-        if c.source in short
-        else c
-        for c in connections
-    ]
+    longer = []
+    for connection in connections:
+        alignment = connection.alignment
+        if connection.source in short:
+            rest = rests[connection.source, connection.source_lane]
+            if not alignment:
+                # Something of the room stays: an internal lane has a length.
+                over = overlaps.get((connection.source, connection.target), 0.0)
+                back = min(over, max(rest.extent - LEAST_EDGE, rest.extent / 2.0))
+                sense = 1.0 if rest.end > rest.start else -1.0
+                rest = rest._replace(end=rest.end - sense * back)
+            alignment = _join_alignments(rest, alignment)
+        longer.append(connection._replace(alignment=alignment))
     return tuple(plans), tuple(longer)
 
 

@@ -58,10 +58,19 @@ TOGETHER = 30.0
 
 
 class RoadGap(NamedTuple):
-    """Part of a road that belongs to a junction, metres of s."""
+    """Part of a road that belongs to a junction, metres of s.
+
+    ``at`` is the place that it is made for, the middle of a crosswalk, where that is known.
+    """
 
     start: float
     end: float
+    at: float = math.nan
+
+    @property
+    def middle(self) -> float:
+        """The place that it is made for, else halfway along it."""
+        return 0.5 * (self.start + self.end) if math.isnan(self.at) else self.at
 
 
 def side_gaps(sides: Sequence[SideLink]) -> dict[RoadId, list[RoadGap]]:
@@ -103,7 +112,7 @@ def _merge_gaps(road: Road, gaps: list[RoadGap]) -> tuple[RoadGap, ...]:
             start = 0.0
         if behind < min(TO_JUNCTION, before) and _at_junction(road, "end"):
             end = road.length
-        found.append(RoadGap(start, end))
+        found.append(RoadGap(start, end, gap.at))
     groups: list[list[RoadGap]] = []
     for gap in found:
         if groups and gap.start - max(group.end for group in groups[-1]) < BETWEEN:
@@ -116,21 +125,38 @@ def _merge_gaps(road: Road, gaps: list[RoadGap]) -> tuple[RoadGap, ...]:
 def _joined_gaps(road: Road, gaps: list[RoadGap]) -> list[RoadGap]:
     """One gap of several that are close; two where one would make two junctions one.
 
-    A short road between two junctions, with a crosswalk at each end, keeps an edge where its gaps
-    are farthest apart: without it both junctions would be one, and their lights lost.
+    A short road between two junctions keeps an edge, where its gaps are farthest apart, or, if they
+    leave no road, in the middle between the crosswalks or at the end far from the only one: without
+    it both junctions would be one, their lights lost, and turns back on the road.
     """
     start, end = gaps[0].start, max(gap.end for gap in gaps)
     whole = [RoadGap(start, end)]
-    from_both = _at_junction(road, "start") and _at_junction(road, "end")
-    if len(gaps) == 1 or start > 0.0 or end < road.length or not from_both:
+    if start > 0.0 or end < road.length or not is_between_junctions(road):
         return whole
+    if len(gaps) == 1:
+        kept = min(SHORTEST, road.length)
+        if gaps[0].middle > 0.5 * road.length:
+            return [RoadGap(0.0, 0.0), RoadGap(kept, road.length)]
+        return [RoadGap(0.0, road.length - kept), RoadGap(road.length, road.length)]
     ends = [max(gap.end for gap in gaps[: n + 1]) for n in range(len(gaps) - 1)]
     spaces = [gap.start - before for gap, before in zip(gaps[1:], ends, strict=True)]
     widest = max(range(len(spaces)), key=lambda n: (spaces[n], -n))
+    before, behind = ends[widest], gaps[widest + 1].start
     short = max(0.0, SHORTEST - spaces[widest]) / 2.0
     if short > MOST_TRIMMED:
-        return whole
-    return [RoadGap(start, ends[widest] - short), RoadGap(gaps[widest + 1].start + short, end)]
+        place = 0.5 * (gaps[widest].middle + gaps[widest + 1].middle)
+        kept = min(SHORTEST, road.length)
+        before = min(max(place - 0.5 * kept, 0.0), road.length - kept)
+        return [RoadGap(0.0, before), RoadGap(before + kept, road.length)]
+    return [RoadGap(start, before - short), RoadGap(behind + short, end)]
+
+
+def is_between_junctions(road: Road) -> bool:
+    """Whether a road leads from one junction to another one."""
+    both = _at_junction(road, "start") and _at_junction(road, "end")
+    if not both or road.predecessor is None or road.successor is None:
+        return False
+    return road.predecessor.element_id != road.successor.element_id
 
 
 def _at_junction(road: Road, end: str) -> bool:
@@ -283,7 +309,7 @@ class _Planner:
 
     def _divide_road(self, road: Road, row: int, gaps: Sequence[RoadGap]) -> list[_RoadPart]:
         borders = {0.0, road.length, *(section.s for section in road.sections)}
-        borders |= {bound for gap in gaps for bound in gap}
+        borders |= {bound for gap in gaps for bound in (gap.start, gap.end)}
         others = {kind.s for kind in road.types} | self._narrow_ends(road)
         for section in road.sections:
             for lane in section.lanes.values():

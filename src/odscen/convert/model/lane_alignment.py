@@ -36,6 +36,12 @@ _LEAST = 1e-3
 _STEP_BACK = 0.05
 """Metres; converters round places by less."""
 
+_LONGEST_CUSP = 10.0
+"""Metres that a lane runs back between two turns, at most."""
+
+_REVERSED = -0.5
+"""Cosine of the angle at which a lane turns round, at most."""
+
 _NEAR = 2.0
 """Metres between the end of a stretch and the start of the next, if they are meant to meet."""
 
@@ -155,6 +161,7 @@ def evaluate(alignments: Sequence[LaneAlignment], table: RoadTable) -> list[Line
     out = np.array([x.beside for x in flat])[owner] * np.sign(table.lane_id[rows[owner]])
     x, y = found.x - out * np.sin(found.hdg), found.y + out * np.cos(found.hdg)
     points = np.column_stack((x, y, found.z))
+    _straighten_cusps(points, found.hdg, owner)
     bounds = first[of_alignment]
     shapes = thinned([_drop_repeated_vertices(points[a:b]) for a, b in pairwise(bounds)])
     lines: list[Line] = []
@@ -210,6 +217,48 @@ def _without_steps_back(
     shortened = end.copy()
     shortened[inner[back]] += sense[back] * along[back]
     return shortened
+
+
+def _straighten_cusps(points: FloatArray, headings: FloatArray, owner: IndexArray) -> None:
+    """Lead past cusps, in place: a lane on the inner side of a bend sharper than its distance.
+
+    Such a lane turns round, runs back for a while and turns round again, across itself. It is
+    straight from before the place where it crosses itself to behind it.
+
+    Parameters
+    ----------
+    points
+        Shape ``(N, 3)``: places along stretches.
+    headings, owner
+        Shape ``(N,)``: direction of the lane at each place, radians, and its stretch.
+    """
+    same = owner[1:] == owner[:-1]
+    turns = np.flatnonzero(same & (np.cos(np.diff(headings)) < _REVERSED))
+    if len(turns) < 2:
+        return
+    steps = np.diff(points[:, :2], axis=0)
+    lengths = np.hypot(*steps.T)
+    place = 0
+    while place < len(turns) - 1:
+        begin, end = int(turns[place]), int(turns[place + 1]) + 1
+        place += 1
+        if owner[begin] != owner[end] or lengths[begin:end].sum() > _LONGEST_CUSP:
+            continue
+        place += 1
+        reach = 4 * (end - begin)
+        own = np.flatnonzero(owner == owner[begin])
+        low, high = max(int(own[0]), begin - reach), min(int(own[-1]), end + reach)
+        # Both lie ahead of each other where the lane has crossed itself: no corner turns back.
+        there, on = slice(low, begin), slice(end, high)
+        apart = points[None, on, :2] - points[there, None, :2]
+        ahead = (np.einsum("ijk,ik->ij", apart, steps[there]) > 0.0) & (
+            np.einsum("ijk,jk->ij", apart, steps[on]) > 0.0
+        )
+        distance = np.where(ahead, np.hypot(apart[..., 0], apart[..., 1]), np.inf)
+        if np.isfinite(distance.min(initial=np.inf)):
+            row, column = np.unravel_index(int(np.argmin(distance)), distance.shape)
+            first, last = low + int(row), end + int(column)
+            points[first : last + 1] = np.linspace(points[first], points[last], last - first + 1)
 
 
 def spread(extents: FloatArray, step: float) -> tuple[IndexArray, IndexArray, FloatArray]:

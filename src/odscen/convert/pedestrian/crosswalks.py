@@ -72,8 +72,10 @@ def place_crosswalks(
                 continue
             under = s[inside[roads == row]]
             margin = min(MARGIN, SHARE * odr.roads[road].length)
-            gap = RoadGap(float(under.min()) - margin, float(under.max()) + margin)
-            taken.setdefault(road, []).append(gap)
-            outside.append((road, float(under.min() + under.max()) / 2.0))
+            first, last = float(under.min()), float(under.max())
+            taken.setdefault(road, []).append(
+                RoadGap(first - margin, last + margin, (first + last) / 2.0)
+            )
+            outside.append((road, (first + last) / 2.0))
         placed.append(PlacedCrosswalk(crosswalk, tuple(outside), tuple(connecting)))
     return tuple(placed), taken

@@ -234,7 +234,9 @@ class RoadLights:
         for growing in (True, False):
             if not stop.read.faces(growing=growing):
                 continue
-            before, behind = stop.gap if growing else stop.gap[::-1]
+            before, behind = stop.gap.start, stop.gap.end
+            if not growing:
+                before, behind = behind, before
             own = self._by_road.get((self._table.road_index[stop.read.road], growing), ())
             arriving = {n for n in own if _same_s(self._edges[n].end, before)}
             leaving = {n for n in own if _same_s(self._edges[n].start, behind)}

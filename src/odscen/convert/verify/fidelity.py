@@ -33,7 +33,7 @@ from odscen.convert.verify.polyline_finder import PIECE_MIN, STEP, Finder, Polyl
 from odscen.convert.verify.signal_coverage import compare_lights
 from odscen.opendrive.objects import crosswalks
 from odscen.opendrive.road_model import DRIVABLE_TYPES, WALKABLE_TYPES
-from odscen.opendrive.topology import cut_off_lanes, lane_successors, side_links
+from odscen.opendrive.topology import cut_off_lanes, folded_lanes, lane_successors, side_links
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -291,7 +291,8 @@ def verify(
         If the network cannot be read.
     """
     net = read_net(net_xml, offset=offset)
-    drivable = _MapLanes(odr, table, DRIVABLE_TYPES, without=cut_off_lanes(odr))
+    cut_off, folded = cut_off_lanes(odr), folded_lanes(odr, table)
+    drivable = _MapLanes(odr, table, DRIVABLE_TYPES, without=cut_off | folded)
     walkable = _MapLanes(odr, table, WALKABLE_TYPES)
     drives = net.driving("normal", "internal")
     on_roads, far_on_roads = _measure_deviation(net.driving("normal"), drivable)
@@ -301,7 +302,7 @@ def verify(
         ln for ln in net.lanes.values() if ln.function == "normal" and ln.walks and not ln.cars
     ]
     walked = walkable.covered(walks, directed=False)
-    relations, missing, invented = _compare_relations(net, odr, drivable)
+    relations, missing, invented = _compare_relations(net, odr, drivable, folded - cut_off)
     shown, lost = _compare_crosswalks(net, odr, table)
     return Fidelity(
         normal=on_roads,
@@ -444,11 +445,11 @@ def _cars_on(walkable: _MapLanes, drivable: _MapLanes, lanes: list[NetFileLane])
 
 
 def _compare_relations(
-    net: NetFile, odr: OpenDrive, drivable: _MapLanes
+    net: NetFile, odr: OpenDrive, drivable: _MapLanes, folded: Collection[LaneKey]
 ) -> tuple[int, tuple[LaneRelation, ...], tuple[LaneRelation, ...]]:
-    """Count the map's relations; list the missing and the invented ones."""
+    """Count the map's relations, over folded lanes too; list the missing and invented ones."""
     keys = drivable.keys()
-    stated = lane_relations(odr, keys)
+    stated = lane_relations(odr, [*keys, *folded])
     pieces = drivable.finder.pieces
     outer = Finder(pieces.take(~drivable.lane_inside[pieces.owner]))
     lanes = {lane.id: lane for lane in net.driving("normal")}
