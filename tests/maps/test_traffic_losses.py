@@ -34,6 +34,7 @@ def test_losses_and_guesses_are_counted_by_kind() -> None:
                 "lanes of type restricted, on which no access allows vehicles: left out",
             ),
             entry("lost", "road 8 > lane 1", "access: deny xyz has no vehicle class in SUMO"),
+            entry("lost", "road 9", "the temporary lane layer is left out [temporary-lanes]"),
             entry("kept", "map", "12 connections between lanes"),
             entry("guessed", "map", "2 traffic lights have programs of odscen's own"),
         ]
@@ -44,12 +45,13 @@ def test_losses_and_guesses_are_counted_by_kind() -> None:
         "lanes_both_ways": 1,
         "roads": 1,
         "signals": 2,
+        "temporary_lanes": 1,
         "unknown_signs": 3,
     }
     assert losses.guessed == {"connections": 1, "road_lengths": 1, "signals": 1}
     assert str(losses) == (
         "; lost for traffic: 1 access rule, 1 lane open both ways, 1 road, 2 lights and signs, "
-        "3 signs not understood"
+        "1 road with temporary lanes, 3 signs not understood"
         "; guessed: 1 connection, 1 length of a road, 1 light or sign"
     )
 

@@ -251,6 +251,44 @@ def test_the_only_lane_layer_of_a_road_holds() -> None:
     assert odr.notes[-1].endswith("the only lane layer, as OpenDRIVE 1.9 has them, holds [version]")
 
 
+LINKED = (
+    '<link><successor id="-1"/><successor id="-1" layer="permanent"/>'
+    '<successor id="-2" layer="temporary"/></link>'
+)
+
+
+def two_layers(permanent: str, temporary: str, first: str = ' layer="permanent"') -> str:
+    lanes = f"<lanes{first}>{permanent}</lanes>"
+    text = road(lanes="@").replace("<lanes>@</lanes>", "@")
+    return text.replace("@", f'{lanes}<lanes layer="temporary">{temporary}</lanes>')
+
+
+@pytest.mark.parametrize("first", [' layer="permanent"', "", ' layer=""'])
+def test_of_two_lane_layers_the_permanent_one_holds(first: str) -> None:
+    works = section(lane(-1, width=2.5), lane(-2, width=2.5)).replace(
+        ' s="0.0"', ' s="20" length="5"'
+    )
+    odr = parse(document(two_layers(LANES, works, first), version="1.9"))
+    assert odr.roads == parse(document(road())).roads
+    assert odr.notes[-1] == (
+        "road 1: the temporary lane layer is left out: traffic keeps to the permanent lanes "
+        "[temporary-lanes]"
+    )
+
+
+def test_links_to_the_temporary_layer_are_not_followed() -> None:
+    permanent = section(lane(-1, inside=LINKED)) + section(lane(-1), s=50.0)
+    odr = parse(document(two_layers(permanent, section(lane(-1))), version="1.9"))
+    first = odr.roads[RoadId("1")].sections[0]
+    assert set(first.lanes[-1].successors) == {-1}
+
+
+def test_a_road_of_two_permanent_lane_layers_is_refused() -> None:
+    text = road(lanes="@").replace("<lanes>@</lanes>", f"<lanes>{LANES}</lanes>" * 2)
+    with pytest.raises(OpenDriveError, match="lanes"):
+        parse(document(text.replace(LANES, LANES.replace("3.5", "3.0"), 1), version="1.9"))
+
+
 def test_several_lane_layers_are_refused_as_which_holds_is_not_clear() -> None:
     layers = "".join(f'<laneLayer id="{number}">{LANES}</laneLayer>' for number in (0, 1))
     with pytest.raises(OpenDriveError) as caught:

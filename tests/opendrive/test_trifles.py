@@ -116,6 +116,9 @@ def test_a_trifle_reads_as_the_file_without_it(trifle: str, everywhere: bool) ->
         (SOUND.replace("?>", ' encoding="windows-1252"?>', 1).encode("cp1252"), []),
         (SOUND.replace('<?xml version="1.0"?>', "").encode(), []),
         (b"\r\n" + SOUND.encode(), ["leading-space"]),
+        (b"<!-- a licence -->\n" + SOUND.encode(), ["leading-space"]),
+        (b"\xef\xbb\xbf<!-- a\n<?xml -->\n <!----> " + SOUND.encode(), ["leading-space"]),
+        (SOUND.encode().replace(b"?>", b"?><!-- a licence -->", 1), []),
     ],
 )
 def test_a_file_is_read_whatever_its_declaration_says(data: bytes, noted: list[str]) -> None:

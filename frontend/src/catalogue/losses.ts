@@ -13,6 +13,8 @@ const WORDS: Record<string, (count: number) => string> = {
   road_lengths: (count) => plural(count, { one: "length of # road", other: "lengths of # roads" }),
   roads: (count) => plural(count, { one: "# road", other: "# roads" }),
   signals: (count) => plural(count, { one: "# light or sign", other: "# lights and signs" }),
+  temporary_lanes: (count) =>
+    plural(count, { one: "# road with temporary lanes", other: "# roads with temporary lanes" }),
   unknown_signs: (count) => plural(count, { one: "# sign not understood", other: "# signs not understood" }),
 };
 

@@ -1580,6 +1580,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "the sun is {height} degrees high at that time" }),
   msg({ message: "the sweep has {number} cases; at most {most_cases} are possible: {listed}" }),
   msg({ message: "the tags of the GeoTIFF are damaged: {error}" }),
+  msg({ message: "the temporary lane layer is left out: traffic keeps to the permanent lanes" }),
   msg({ message: "the token must have 16 to 256 letters, digits, '-' or '_'" }),
   msg({ message: "the user's share of the disk is used up; free some room" }),
   msg({ message: "the variance {variance} is negative" }),

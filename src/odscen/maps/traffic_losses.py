@@ -16,6 +16,7 @@ LossKind = Literal[
     "road_lengths",
     "roads",
     "signals",
+    "temporary_lanes",
     "unknown_signs",
 ]
 """What road users meet that a map may lose in the import, or that is not as the file says."""
@@ -29,6 +30,7 @@ _LOST: tuple[tuple[LossKind, str], ...] = (
     ("access_rules", "access: "),
     ("access_rules", "access of "),
     ("crosswalks", "crosswalk"),
+    ("temporary_lanes", "[temporary-lanes]"),
 )
 _GUESSED: tuple[tuple[LossKind, str], ...] = (
     ("connections", "[junction-table]"),
@@ -49,6 +51,7 @@ _NAMES: dict[LossKind, tuple[str, str]] = {
     "road_lengths": ("length of a road", "lengths of roads"),
     "roads": ("road", "roads"),
     "signals": ("light or sign", "lights and signs"),
+    "temporary_lanes": ("road with temporary lanes", "roads with temporary lanes"),
     "unknown_signs": ("sign not understood", "signs not understood"),
 }
 

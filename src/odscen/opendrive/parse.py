@@ -42,6 +42,7 @@ READ: Final = frozenset({"header", "road", "controller", "junction", "userData"}
 IGNORED: Final = frozenset({"junctionGroup", "station", "include", "dataQuality"})
 NO_HEADER: Final = Header(1, 4, "", None, None, None, None, "", None)
 """What stands for a missing ``<header>``: the oldest version, no bounds, no projection."""
+_BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 _CRS_TEXT: Final = re.compile(r"proj=|init=|EPSG:|ESRI:|CRS\[|CS\[", re.IGNORECASE)
 _DECLARED_ENCODING: Final = re.compile(
     rb"""(?:\xef\xbb\xbf)?<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']"""
@@ -93,12 +94,30 @@ def read_tree(text: str | bytes, notes: Notes) -> Element:
 
 
 def _without_leading_space(text: str | bytes) -> str | bytes:
-    """The text from its XML declaration on: XML permits nothing before, not even a space."""
+    """The text from its XML declaration on: XML permits neither spaces nor comments before it."""
     if isinstance(text, str):
-        start = text.lstrip("\ufeff \t\r\n")
-        return start if start.startswith("<?xml") else text
-    data = text.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
-    return data if data.startswith(b"<?xml") and not text.startswith(b"\xef\xbb\xbf<") else text
+        place = _find_declaration(text.encode("utf-8", "surrogatepass"))
+        return text.encode("utf-8", "surrogatepass")[place:].decode("utf-8", "surrogatepass")
+    return text[_find_declaration(text) :]
+
+
+def _find_declaration(data: bytes) -> int:
+    """Where the declaration begins, behind spaces and comments; 0 if nothing is before it."""
+    mark = len(_BYTE_ORDER_MARK) if data.startswith(_BYTE_ORDER_MARK) else 0
+    place = mark
+    while place < len(data):
+        if data.startswith(b"<?xml", place):
+            return place if place > mark else 0
+        if data.startswith(b"<!--", place):
+            end = data.find(b"-->", place)
+            if end < 0:
+                return 0
+            place = end + 3
+        elif data[place : place + 1].isspace():
+            place += 1
+        else:
+            return 0
+    return 0
 
 
 def _decode_as_meant(text: str | bytes, notes: Notes) -> str | bytes:

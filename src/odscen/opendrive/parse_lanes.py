@@ -68,6 +68,24 @@ _LANE_CHANGES: Final[dict[str | None, LaneChange]] = {
 R = TypeVar("R", LaneAccess, LaneHeight, LaneSpeed, RoadMark)
 
 
+_TEMPORARY: Final = "temporary"
+"""The lane layer of 1.9 for road works; the other one is permanent, or has no name."""
+
+
+def permanent_lanes(road: Element, found: list[Element], notes: Notes) -> list[Element]:
+    """The ``<lanes>`` of a road without those of road works (1.9, section 11.2).
+
+    The permanent layer is as long as the road, and holds as long as nothing is in the way. Lanes of
+    the temporary one have priority where they are; the file does not say when that is.
+    """
+    temporary = [lanes for lanes in found if lanes.get("layer", "").strip().lower() == _TEMPORARY]
+    if not temporary or len(temporary) == len(found):
+        return found
+    detail = "the temporary lane layer is left out: traffic keeps to the permanent lanes"
+    notes.add(Rule.TEMPORARY_LANES, road, detail)
+    return [lanes for lanes in found if lanes not in temporary]
+
+
 def open_sole_layer(lanes: Element, notes: Notes) -> dict[str, list[Element]]:
     """Children of ``<lanes>`` by name: those of its lane layer (1.9) where it has nothing but one.
 
@@ -282,7 +300,7 @@ def _check_widths(element: Element, groups: dict[str, list[Element]], notes: Not
 def _lane_links(link: Element | None, notes: Notes) -> tuple[tuple[int, ...], tuple[int, ...]]:
     linked: dict[str, list[int]] = {"predecessor": [], "successor": []}
     for element in () if link is None else link:
-        if element.tag not in linked:
+        if element.tag not in linked or element.get("layer", "") == _TEMPORARY:
             continue
         if not element.get("id", "").strip():
             notes.add(Rule.DANGLING_LINK, element, "it names no lane; the link is left out")

@@ -13,7 +13,7 @@ from odscen.base.errors import OpenDriveError
 from odscen.base.ids import JunctionId, RoadId
 from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_furniture import parse_objects, parse_signals
-from odscen.opendrive.parse_lanes import open_sole_layer, parse_sections
+from odscen.opendrive.parse_lanes import open_sole_layer, parse_sections, permanent_lanes
 from odscen.opendrive.parse_rules import (
     MAX_COORDINATE,
     MAX_NUMBER,
@@ -88,6 +88,8 @@ def parse_road(element: Element, notes: Notes) -> Road:
     link = only(groups, "link")
     length, is_point = _parse_length_or_point(element, link, notes)
     lateral = _container_children(groups, "lateralProfile", {"superelevation"}, notes)
+    if len(groups.get("lanes", ())) > 1:
+        groups["lanes"] = permanent_lanes(element, groups["lanes"], notes)
     lanes = only(groups, "lanes")
     if lanes is None:
         raise refusal(element, "there is no <lanes>")

@@ -22,7 +22,7 @@ class Rule(StrEnum):
     GEO_REFERENCE = "geo-reference"
     """A geoReference that pyproj does not understand is kept as text; coordinates do not change."""
     LEADING_SPACE = "leading-space"
-    """White space before the XML declaration is skipped."""
+    """White space and comments before the XML declaration are skipped."""
     SPELLING = "spelling"
     """A value of the standard in other letters, as ``KMH`` for ``km/h``, means that value."""
     JUNCTION_ATTRIBUTE = "junction-attribute"
@@ -48,6 +48,8 @@ class Rule(StrEnum):
     """An element that is in a file twice in a row, alike in everything, counts once."""
     ROAD_LEFT_OUT = "road-left-out"
     """A road that cannot be read is left out, if the others hang together without it."""
+    TEMPORARY_LANES = "temporary-lanes"
+    """The temporary lane layer of a road (1.9), as for road works, is left out."""
     POINT_ROAD = "point-road"
     """A road of no length that joins two others counts as one of 1 mm."""
     ROAD_LENGTH = "road-length"
@@ -128,7 +130,7 @@ class Rule(StrEnum):
 
 LOSING_RULES: Final = frozenset(
     {Rule.ROAD_LEFT_OUT, Rule.CONNECTION_LEFT_OUT, Rule.OBJECT_LEFT_OUT, Rule.SIGNAL_LEFT_OUT}
-    | {Rule.ACCESS_LEFT_OUT}
+    | {Rule.ACCESS_LEFT_OUT, Rule.TEMPORARY_LANES}
 )
 """Rules by which something of the file is lost, not repaired."""
 
