@@ -72,6 +72,7 @@ def built(*signs: str) -> SumoNetwork:
         ("BE", "B5", "-1", "stop"),
         ("PL", "A-7", "", "yield"),
         ("PL", "B", "20", "stop"),
+        ("PL", "D-12", "", "bus_lane"),
         ("POL", "D1", "", "priority"),
         ("CZ", "P6", "", "stop"),
         ("CH", "3.02", "", "yield"),

@@ -183,6 +183,7 @@ _PL: Final[dict[str, SignMeaning]] = {
     "b33": "speed_limit",
     "b34": "end_of_speed_limit",
     "d11": "bus_lane",
+    "d12": "bus_lane",
     "d6": "crosswalk",
 }
 
