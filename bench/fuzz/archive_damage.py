@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import io
 import zipfile
+from typing import Any
 
 import numpy as np
 
 from bench.fuzz.damage import RAW, Change, Generator, flipped, pick, torn
+
+Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _member(data: bytes, rng: Generator) -> bytes:
@@ -56,6 +59,14 @@ def _array(member: bytes, rng: Generator) -> bytes:
     except (ValueError, EOFError, OSError):
         return flipped(member, rng)
     what = pick(rng, ("type", "shape", "value", "shorter", "empty"))
+    with np.errstate(all="ignore"):  # numbers that its type does not have are meant
+        array = _changed_array(array, what, rng)
+    made = io.BytesIO()
+    np.lib.format.write_array(made, np.asarray(array), allow_pickle=False)
+    return made.getvalue()
+
+
+def _changed_array(array: Array, what: str, rng: Generator) -> Array:
     if what == "type":
         array = (
             array.astype(pick(rng, ("U20", "i8", "u1", "?", "c16")), casting="unsafe")
@@ -75,9 +86,7 @@ def _array(member: bytes, rng: Generator) -> bytes:
             if array.dtype.kind == "f"
             else pick(rng, (-1, np.iinfo(array.dtype).max, np.iinfo(array.dtype).min))
         )
-    made = io.BytesIO()
-    np.lib.format.write_array(made, np.asarray(array), allow_pickle=False)
-    return made.getvalue()
+    return array
 
 
 ARCHIVE: dict[str, Change] = {**RAW, **{f"member {n}": _member for n in range(8)}}

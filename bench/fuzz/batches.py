@@ -34,14 +34,18 @@ BATCHED = (
     "edits of files",
     "feed",
     "graph form",
+    "history",
     "lights",
     "map",
     "openscenario",
+    "picture",
+    "recording",
     "run folder",
     "scenario",
     "study plan",
     "sweep plan",
     "tables",
+    "weights",
 )
 
 

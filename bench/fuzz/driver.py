@@ -31,6 +31,7 @@ from bench.fuzz.handed_targets import HANDED_TARGETS
 from bench.fuzz.limits import Limits
 from bench.fuzz.material import Material, prepare
 from bench.fuzz.process_targets import PROCESS_TARGETS
+from bench.fuzz.received_targets import RECEIVED_TARGETS
 from bench.fuzz.request_targets import handmade_trial, schema_trial
 from bench.fuzz.served import Served
 from bench.fuzz.state_targets import STATE_TARGETS
@@ -65,6 +66,7 @@ class Bench:
             **FOLDER_TARGETS,
             **FAULT_TARGETS,
             **HANDED_TARGETS,
+            **RECEIVED_TARGETS,
             **STATE_TARGETS,
             **PROCESS_TARGETS,
             **BYTE_TARGETS,
@@ -73,9 +75,9 @@ class Bench:
             targets[name] = (self._with_server(target), share)
         self.targets = targets
 
-    def prepare(self) -> None:
-        """Make what is to be damaged."""
-        self.material = self.served.material = prepare(self.material.root, self.limits)
+    def prepare(self, made: Path | None = None) -> None:
+        """Make what is to be damaged, in a folder that another bench may use again."""
+        self.material = self.served.material = prepare(made or self.material.root, self.limits)
 
     def _with_server(self, target: Callable[[Trial, Served], str]) -> Callable[[Trial], str]:
         return lambda trial: target(trial, self.served)
@@ -161,7 +163,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     bench = Bench(root)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends with what it has started
     try:
-        bench.prepare()
+        bench.prepare(options.material)
         begin = time.perf_counter()
         known = sorted(bench.targets)
         chosen = [options.target] if options.target else options.targets or known
@@ -187,6 +189,9 @@ def _options(argv: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=1, help="seed of the first trials")
     parser.add_argument("--seed", type=int, help="one trial of each target, and keep its folder")
     parser.add_argument("--target", help="one target")
+    parser.add_argument(
+        "--material", type=Path, metavar="FOLDER", help="what is damaged; made there if need be"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all trials")
     return parser.parse_args(argv)
 

@@ -16,6 +16,10 @@ from bench.fuzz.limits import Ended, Limits, kill_tree
 
 ROOT = Path(__file__).parents[2]
 CROSSING = "signal_crossing"
+_MADE = ".maps"
+"""Names the maps; there once all of it is."""
+PATIENCE = 600.0
+"""Seconds for a command that makes material: nothing is known of it that takes longer."""
 SMALL = 100_000
 """Bytes of the largest map that is damaged: the limits of time are for small maps."""
 
@@ -49,7 +53,10 @@ class Material:
 
 
 def prepare(root: Path, limits: Limits) -> Material:
-    """Make the material with the command line itself."""
+    """Make the material with the command line itself, unless it has been made before."""
+    root = root.resolve()
+    if (root / _MADE).exists():
+        return Material(root, tuple(map(Path, (root / _MADE).read_text().splitlines())))
     root.mkdir(parents=True)
     workspace = root / "workspace"
     shipped = [
@@ -110,6 +117,8 @@ def prepare(root: Path, limits: Limits) -> Material:
     (root / "config.toml").write_text(CONFIG, encoding="utf-8")
     _runs(material, limits, sampled)
     _handed(material, limits, sampled)
+    _received(material, limits)
+    (root / _MADE).write_text("\n".join(map(str, material.map_files)), encoding="utf-8")
     return material
 
 
@@ -219,6 +228,16 @@ def _handed(material: Material, limits: Limits, sampled: Path) -> None:
     _ok(limits, root, "test", suite, "--results", str(results), *used)
 
 
+def _received(material: Material, limits: Limits) -> None:
+    """Recordings, pictures, a history and weights; one of each kept in the workspace."""
+    from bench.fuzz.received_material import write_received
+
+    root = material.root
+    ended = limits.run(("received",), root, question=lambda: write_received(root))
+    if ended.code:
+        raise RuntimeError(f"what is received cannot be made: {ended.err}")
+
+
 def write_scenes(folder: Path) -> None:
     """A cut-in with conditions of many kinds, and one whose manoeuvre is in a catalog."""
     from tests.app.test_scenario_imports import FILE, ROAD, SPEED
@@ -291,7 +310,7 @@ def _tables(root: Path) -> None:
 
 
 def _ok(limits: Limits, root: Path, *argv: str) -> Ended:
-    ended = limits.run(argv, root)
+    ended = limits.run(argv, root, seconds=PATIENCE)
     if ended.code:
         raise RuntimeError(
             f"the material cannot be made: odscen {' '.join(argv)}: {ended.err}{ended.out}"

@@ -88,7 +88,7 @@ def test_a_file_keeps_a_line_a_run_and_the_last_of_a_commit_counts(tmp_path: Pat
     found = read_history(file)
     assert [x.cases["town"].figures["mean_delay"] for x in found] == [31.0, 36.0]
     file.write_text(file.read_text() + '{"format": "odscen-history", "version": 1}\n')
-    with pytest.raises(InputError, match=r"history\.jsonl: line 4: no line of a history"):
+    with pytest.raises(InputError, match=r"history\.jsonl: line 4: not a line of a history"):
         read_history(file)
     with pytest.raises(InputError, match="line 4"):
         append_history(file, line(3, {}))

@@ -14,7 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image, TiffImagePlugin
 
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, LimitError
+from odscen.maps import background
+from odscen.maps.allowances import Allowance
 from odscen.maps.background import (
     PicturePoint,
     _place_pixels,
@@ -138,7 +140,21 @@ def huge_png() -> bytes:
         (picture(), {"world": "1 0 0 -1 nan 5"}, "do not span a plane"),
         (picture(), {"world": "1 0 0 -1 0 0", "crs": "EPSG:nine"}, "no coordinate reference"),
         (picture(), {"world": "1 0 0 -1 500000 5000000"}, "4,999,880 m beside the map"),
+        (picture(), {"world": "1e308 0 0 1e308 0 0"}, "do not span a plane"),
+        (picture(), {"world": "1e6 0 0 -1e6 0 0"}, "40,000,000 m wide, and 1,000,000 m are the"),
+        (picture(), {"world": "1 0 0 -1 0 0", "crs": "/etc/passwd"}, "no coordinate reference"),
+        (picture(), {"world": "1 0 0 -1 0 0", "crs": "EPSG:" + "9" * 9999}, "no coordinate"),
+        (
+            picture(),
+            {"world": "1 0 0 -1 0 0", "crs": "+proj=longlat +nadgrids=/etc/passwd"},
+            "no coordinate reference",
+        ),
         (picture(), {"points": [PicturePoint(1, 1, 0, 0)]}, "two points or more"),
+        (
+            picture(),
+            {"points": [PicturePoint(1e308, 1, 0, 0), PicturePoint(-1e308, 1, 1, 1)]},
+            "numbers up to 1,000,000,000",
+        ),
         (picture(), {"points": [PicturePoint(1, 1, 0, 0)] * 2}, "must be at different places"),
     ],
 )
@@ -148,3 +164,15 @@ def test_what_cannot_be_placed_is_refused_with_its_reason(
     with pytest.raises(InputError) as refused:
         place_picture(content, source="p", header=HEADER, bounds=BOUNDS, **more)  # type: ignore[arg-type]
     assert problem in str(refused.value)
+
+
+def test_a_tiff_of_a_few_kilobytes_that_unpacks_to_gigabytes_ends_a_child_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    out = io.BytesIO()
+    Image.new("1", (10_000, 10_000)).save(out, "TIFF", compression="group4")
+    assert len(out.getvalue()) < 10_000
+    monkeypatch.setattr(background, "for_picture", lambda: Allowance(350_000_000, 60.0))
+    points = [PicturePoint(0, 0, 0, 0), PicturePoint(60, 0, 60, 0)]
+    with pytest.raises(LimitError, match=r"reading the picture needs more than 0\.35 GB"):
+        place_picture(out.getvalue(), source="p.tif", header=HEADER, bounds=BOUNDS, points=points)

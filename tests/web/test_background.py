@@ -52,6 +52,7 @@ def test_a_picture_is_laid_under_a_map_shown_and_taken_away(client: TestClient) 
         ({"file": ("p.png", b"no picture")}, {}, "PNG, JPEG or TIFF"),
         ({"file": ("p.png", picture())}, {"points": "[[1]]"}, "rows of column, row, x and y"),
         ({"file": ("p.png", picture())}, {"points": "[" * 100_000}, "rows of column"),
+        ({"file": ("p.png", picture())}, {"points": f"[[{'9' * 400}, 0, 0, 0]]"}, "rows of column"),
         ({"file": ("p.png", picture()), "world": ("w", b"\xff")}, {}, "six numbers"),
     ],
 )

@@ -34,7 +34,11 @@ def npz_bytes(arrays: Mapping[str, Array]) -> bytes:
 
 
 def arrays_from_npz(
-    data: bytes, *, file: str | None = None, only: Collection[str] | None = None
+    data: bytes,
+    *,
+    file: str | None = None,
+    only: Collection[str] | None = None,
+    most: int = MOST_UNPACKED,
 ) -> dict[str, Array]:
     """Read the arrays of an .npz file; each has the size that its header says, or is refused.
 
@@ -42,6 +46,8 @@ def arrays_from_npz(
     ----------
     only
         Names of the arrays that are wanted, of those that are there; all if not given.
+    most
+        Bytes of all of them together, unpacked.
 
     Raises
     ------
@@ -52,23 +58,21 @@ def arrays_from_npz(
         raise InputError("it is a single array, not an .npz file with named ones", file=file)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            return _read_arrays(archive, file, only)
+            return _read_arrays(archive, file, only, most)
     except UNREADABLE_ARCHIVE as error:
         raise InputError("it cannot be read as an .npz file", file=file) from error
 
 
 def _read_arrays(
-    archive: zipfile.ZipFile, file: str | None, only: Collection[str] | None
+    archive: zipfile.ZipFile, file: str | None, only: Collection[str] | None, most: int
 ) -> dict[str, Array]:
     members = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
     if len(members) > MOST_ARRAYS:
         raise InputError(f"it has {len(members)} arrays; {MOST_ARRAYS} are the most", file=file)
     wanted = [name for name in members if only is None or name in only]
     size = sum(members[name].file_size for name in wanted)
-    if size > MOST_UNPACKED:
-        raise InputError(
-            f"its arrays have {size:,} bytes; {MOST_UNPACKED:,} are the most", file=file
-        )
+    if size > most:
+        raise InputError(f"its arrays have {size:,} bytes; {most:,} are the most", file=file)
     found = {}
     for name in wanted:
         try:

@@ -21,6 +21,7 @@ import numpy as np
 from odscen.base.errors import InputError
 from odscen.base.given_files import read_given
 from odscen.base.markup import Markup, element, join
+from odscen.base.stored_files import documents, read_document
 from odscen.experiments.measure import FigureKey
 from odscen.experiments.tolerance import usual
 from odscen.figures.measures.registry import figure_of
@@ -41,6 +42,7 @@ _SHORT = 10
 """Letters of a commit that are shown."""
 _NOISE = 1e-4
 """Figures are written with that many decimals."""
+_LARGEST = 1e15
 _MOST_LABELS = 8
 """Of commits below a chart."""
 
@@ -217,29 +219,36 @@ def read_history(file: Path) -> tuple[HistoryLine, ...]:
         if not text.strip():
             continue
         try:
-            line = _parse_line(json.loads(text))
-        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise InputError(
-                f"no line of a history: {error!r}", file=str(file), element=f"line {number}"
-            ) from error
+            line = _parse_line(text)
+        except InputError as error:
+            raise InputError(error.problem, file=str(file), element=f"line {number}") from error
         place = line.suite, line.commit
         found.pop(place, None)
         found[place] = line
     return tuple(found.values())
 
 
-def _parse_line(values: Mapping[str, Any]) -> HistoryLine:
-    if (values["format"], values["version"]) != (_FORMAT, _VERSION):
-        raise ValueError(f"format {values['format']!r} version {values['version']!r}")
-    cases = {
-        str(name): CaseLine(
-            str(case["status"]),
-            tuple(int(seed) for seed in case["seeds"]),
-            {str(figure): float(value) for figure, value in case["figures"].items()},
-        )
-        for name, case in values["cases"].items()
-    }
-    return HistoryLine(str(values["suite"]), str(values["commit"]), str(values["date"]), cases)
+def _parse_line(text: str) -> HistoryLine:
+    what = "a line of a history"
+    values = read_document(text, form=_FORMAT, version=_VERSION, what=what)
+    with documents(what):
+        cases = {
+            str(name): CaseLine(
+                str(case["status"]),
+                tuple(int(seed) for seed in case["seeds"]),
+                {str(figure): _read_figure(value) for figure, value in case["figures"].items()},
+            )
+            for name, case in values["cases"].items()
+        }
+        return HistoryLine(str(values["suite"]), str(values["commit"]), str(values["date"]), cases)
+
+
+def _read_figure(value: Any) -> float:
+    """A number that can be drawn beside others."""
+    number = float(value)
+    if not abs(number) <= _LARGEST:
+        raise InputError(f"a figure is {value!r}, not a number up to {_LARGEST:g}")
+    return number
 
 
 def current_commit(folder: Path) -> tuple[str, str]:

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
-import zlib
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, in_file
+from odscen.base.given_arrays import arrays_from_npz
+from odscen.base.stored_files import documents
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -156,9 +156,8 @@ def shard_from_bytes(data: bytes, *, file: str) -> Shard:
     InputError
         If it is no shard.
     """
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+    arrays = arrays_from_npz(data, file=file)
+    with in_file(file), documents("a shard of snapshots", RecursionError):
         about = json.loads(str(arrays["about"][0]))
         if about["version"] != VERSION:
             raise InputError(
@@ -167,11 +166,6 @@ def shard_from_bytes(data: bytes, *, file: str) -> Shard:
         return Shard(
             about["map"], about["sha256"], about["town"], about["about"], _read_snapshots(arrays)
         )
-    except (
-        zipfile.BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError, TypeError,
-        IndexError,
-    ) as error:  # fmt: skip
-        raise InputError(f"it is no shard of snapshots: {error}", file=file) from error
 
 
 def _lanes_with_lights(snapshots: tuple[Snapshot, ...]) -> IntArray:

@@ -45,6 +45,10 @@ RECORDING_MEMORY_PER_BYTE = 12
 RECORDING_SECONDS = 60.0
 RECORDING_SECONDS_PER_MEGABYTE = 5.0
 """The same for recorded traffic that is read, placed on a map and searched for scenes."""
+PICTURE_MEMORY = 1_200_000_000
+PICTURE_SECONDS = 120.0
+"""The same for a TIFF of any size that pictures under maps may have: one of 100 million pixels
+needs 0.9 GB and 30 s."""
 TRIAL_MEMORY = 8_000_000_000
 TRIAL_SECONDS = 7200.0
 _FILE_SHARE = 4
@@ -206,6 +210,11 @@ def for_recording(size: int) -> Allowance:
         RECORDING_MEMORY + RECORDING_MEMORY_PER_BYTE * size,
         RECORDING_SECONDS + RECORDING_SECONDS_PER_MEGABYTE * size / 1e6,
     )
+
+
+def for_picture() -> Allowance:
+    """What unpacking a picture may use: a few kB may be one of the largest size."""
+    return Allowance(PICTURE_MEMORY, PICTURE_SECONDS)
 
 
 def for_large_document(size: int) -> Allowance:

@@ -6,7 +6,6 @@ picture and on the map are both known. Nothing is fetched from anywhere.
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import warnings
@@ -16,12 +15,16 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 import numpy as np
 
-from odscen.base.atomic_folders import new_folder
+from odscen.base.atomic_folders import new_folder, scratch_folder
 from odscen.base.checksums import SUMS_FILE, read_checked, read_sums, sums_of, write_sums
 from odscen.base.errors import InputError, MissingDependencyError, in_file
+from odscen.base.shown import shown
 from odscen.base.stored_files import stored_document
 from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_file, write_text
+from odscen.maps.allowances import for_picture
+from odscen.maps.child_process import work_in_child
+from odscen.opendrive.parse import names_projection
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -35,8 +38,15 @@ MOST_BYTES = 100 * 1024 * 1024
 MOST_SIDE = 16_384
 """Pixels of a side: what browsers draw."""
 MOST_PIXELS = 100_000_000
+_FARTHEST = 1e9
+"""Units of any coordinate reference system, and pixels, beyond which nothing lies."""
+_LARGEST = 1e6
+"""Metres that a side of a picture may have on the map."""
+_MOST_CRS = 4000
+"""Letters of a coordinate reference system as WKT."""
 _FORM, _VERSION = "odscen-background", 1
 _FILE = "background.json"
+_SENT, _UNPACKED = "sent.tif", "picture.png"
 _SHIFT = 0.5
 """Metres by which a straight picture may miss its places once they are on the map's projection."""
 _WORLD_SUFFIXES = (".wld", ".pgw", ".pngw", ".jgw", ".jpgw", ".jpegw", ".tfw", ".tifw")
@@ -161,8 +171,8 @@ def fit_points(points: Sequence[PicturePoint]) -> Affine:
     if len(points) < 2:
         raise InputError(f"two points or more place a picture, not {len(points)}")
     rows = np.array(points, dtype=np.float64)
-    if not np.isfinite(rows).all():
-        raise InputError("points of a picture must be numbers")
+    if not (np.abs(rows) <= _FARTHEST).all():
+        raise InputError(f"points of a picture must be numbers up to {_FARTHEST:,.0f}")
     # Rows go down and y goes up: a similarity of complex numbers after that.
     there, here = rows[:, 0] - 1j * rows[:, 1], rows[:, 2] + 1j * rows[:, 3]
     spread = there - there.mean()
@@ -335,9 +345,38 @@ def _find_jpeg_size(content: bytes) -> tuple[int, int]:
 
 
 def _decode_tiff(content: bytes) -> _Decoded:
-    """Write a TIFF as PNG, which browsers draw, and read the tags of GeoTIFF 1.1."""
+    """Have a child write a TIFF as PNG, which browsers draw, and read the tags of GeoTIFF 1.1.
+
+    A file of a few kB may unpack to a picture of the largest size.
+    """
+    with disk_errors("reading the picture"), scratch_folder() as folder:
+        (folder / _SENT).write_bytes(content)
+        told = work_in_child(
+            f"{__name__}:write_tiff_as_png",
+            what="reading the picture",
+            arguments={"folder": str(folder)},
+            folders=(folder,),
+            allowance=for_picture(),
+        )
+        png = (folder / _UNPACKED).read_bytes()
+    placed = None if told["placed"] is None else cast("Affine", tuple(told["placed"]))
+    return _Decoded(png, "image/png", told["width"], told["height"], placed, told["crs"])
+
+
+def write_tiff_as_png(*, folder: str, progress: Callable[[str, float], None]) -> dict[str, object]:
+    """Write the TIFF of a folder as PNG; a job of a child.
+
+    Returns
+    -------
+    dict
+        ``width``, ``height``, and ``placed`` and ``crs``, which its tags tell.
+    """
+    progress("reading the picture", 0.0)
+    sent, made = Path(folder) / _SENT, Path(folder) / _UNPACKED
     try:
         from PIL import Image, UnidentifiedImageError
+
+        Image.MAX_IMAGE_PIXELS = MOST_PIXELS  # of this child; Pillow's own is a little less
     except ImportError:
         raise MissingDependencyError(
             "TIFF files need Pillow: pip install 'odscen[png]'; or save the picture as PNG "
@@ -346,7 +385,7 @@ def _decode_tiff(content: bytes) -> _Decoded:
     try:
         with (
             warnings.catch_warnings(action="error"),  # Pillow warns of what is damaged, and goes on
-            Image.open(io.BytesIO(content), formats=("TIFF",)) as image,
+            Image.open(sent, formats=("TIFF",)) as image,
         ):
             width, height = _checked_size(*image.size)
             if image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA", "CMYK", "YCbCr"):
@@ -354,15 +393,16 @@ def _decode_tiff(content: bytes) -> _Decoded:
                     f"a TIFF of the mode {image.mode} has no colours of 8 bits; save it with them"
                 )
             tags = dict(getattr(image, "tag_v2", {}))
-            out = io.BytesIO()
-            image.convert("RGBA" if image.mode in ("LA", "RGBA") else "RGB").save(out, "PNG")
+            wanted = "RGBA" if image.mode in ("LA", "RGBA") else "RGB"
+            drawn = image if image.mode == wanted else image.convert(wanted)
+            drawn.save(made, "PNG", compress_level=1)  # more hardly makes photographs smaller
     except InputError:
         raise
     except (UnidentifiedImageError, OSError, ValueError, LookupError, SyntaxError, TypeError,
             ArithmeticError, Warning) as error:  # fmt: skip
         raise InputError(f"the TIFF file cannot be read: {error}") from error
     placed, crs = _read_geotiff_tags(tags)
-    return _Decoded(out.getvalue(), "image/png", width, height, placed, crs)
+    return {"width": width, "height": height, "placed": placed, "crs": crs}
 
 
 def _read_geotiff_tags(tags: dict[int, object]) -> tuple[Affine | None, str | None]:
@@ -397,7 +437,8 @@ def _read_geotiff_tags(tags: dict[int, object]) -> tuple[Affine | None, str | No
 
 def _refuse_flat(affine: Affine) -> Affine:
     a, b, _, d, e, _ = affine
-    if not all(map(math.isfinite, affine)) or abs(a * e - b * d) < 1e-16:
+    # A comparison that holds of no number that is none.
+    if not all(abs(number) <= _FARTHEST for number in affine) or abs(a * e - b * d) < 1e-16:
         raise InputError("the numbers that place the picture do not span a plane")
     return affine
 
@@ -420,7 +461,8 @@ def _onto_map(affine: Affine, crs: str | None, header: Header, picture: _Decoded
         return affine
     convert = _to_map_metres(crs, header)
     pixels = _find_corners(picture.width, picture.height)
-    x, y = convert(*_place_pixels(affine, pixels))
+    with np.errstate(invalid="ignore"):  # where a projection has no place there is no number
+        x, y = convert(*_place_pixels(affine, pixels))
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
         raise InputError(f"the picture lies where {crs} cannot be carried over to the map")
     terms = np.column_stack((pixels, np.ones(len(pixels))))
@@ -445,10 +487,14 @@ def _to_map_metres(
             "the map has no georeference that is understood; place the picture by two points",
             element="geoReference",
         )
+    # Any other word would be looked for in all of the database, and a grid is a file.
+    if not names_projection(crs) or len(crs) > _MOST_CRS or "grids=" in crs:
+        raise InputError(f"no coordinate reference system: {shown(crs)}")
     try:
-        transformer = pyproj.Transformer.from_crs(crs, header.crs, always_xy=True)
+        with warnings.catch_warnings(action="ignore"):  # of old ways to write one
+            transformer = pyproj.Transformer.from_crs(crs, header.crs, always_xy=True)
     except pyproj.exceptions.ProjError as error:
-        raise InputError(f"no coordinate reference system: {crs[:60]!r}") from error
+        raise InputError(f"no coordinate reference system: {shown(crs)}") from error
     x0, y0, _, hdg = header.offset
 
     def convert(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -461,6 +507,11 @@ def _to_map_metres(
 
 
 def _refuse_elsewhere(picture: Bounds, map_bounds: Bounds) -> None:
+    side = max(picture[2] - picture[0], picture[3] - picture[1])
+    if side > _LARGEST:
+        raise InputError(
+            f"the picture would be {side:,.0f} m wide, and {_LARGEST:,.0f} m are the most"
+        )
     apart = max(
         picture[0] - map_bounds[2],
         map_bounds[0] - picture[2],

@@ -117,8 +117,8 @@ class Workspace:
         own = as_path(root).absolute()
         with _workspace_errors(own):
             (own / "maps").mkdir(parents=True, exist_ok=True)
-        for folder in (own / "maps", own / "runs"):
-            clear_leftovers(folder)
+        for folder in ("maps", f"maps/{BACKGROUNDS}", "runs", "recordings"):
+            clear_leftovers(own / folder)
         return cls(own)
 
     @property

@@ -350,11 +350,16 @@ def _parse_offset(element: Element | None, notes: Notes) -> tuple[float, float, 
     return (x, y, z, hdg)
 
 
+def names_projection(text: str) -> bool:
+    """Whether a text is a coordinate reference system, by how it is written: EPSG, proj or WKT."""
+    return _CRS_TEXT.search(text) is not None
+
+
 def _parse_crs(text: str, element: Element, notes: Notes) -> str | None:
     """WKT of a geoReference, if pyproj understands it."""
     if not text:
         return None
-    if not _CRS_TEXT.search(text):
+    if not names_projection(text):
         # pyproj would search its whole database for a name like this, for a fifth of a second.
         detail = f"geoReference {shown(text)} names no projection; kept as text"
         notes.add(Rule.GEO_REFERENCE, element, detail)

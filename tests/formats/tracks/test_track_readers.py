@@ -152,6 +152,14 @@ def with_text(files: dict[str, str], name: str, old: str, new: str) -> dict[str,
             {"a_000.csv": INTERACTION.replace("2,200", "2,100")},
             r"road user 1 at 0.1 s: it is at \(1, 2\) and at \(1.3, 2.4\)",
         ),
+        (
+            {"a_000.csv": INTERACTION.replace("1.3,2.4", "1e308,2.4")},
+            r"a_000.csv: road user 1 at 0.2 s: x is 1e\+308, not a number up to 1e\+08",
+        ),
+        (
+            {"a_000.csv": INTERACTION.replace("2,200", "2,nan")},
+            r"a_000.csv: road user 1 at nan s: time is nan, not a finite number",
+        ),
         (with_text(HIGHD, "01_tracksMeta.csv", "2,12.0", "3,12.0"), "road user 2 .* is not in it"),
         (
             with_text(HIGHD, "01_recordingMeta.csv", "25", "fast"),
@@ -162,6 +170,10 @@ def with_text(files: dict[str, str], name: str, old: str, new: str) -> dict[str,
         (
             {"a.csv": "when,where\n1,2\n"},
             r"a.csv: its columns are those of no .*when, where",
+        ),
+        (
+            {"a.csv": ",".join(f"column-{n}" for n in range(100_000)) + "\n1\n"},
+            r"column-11, \.\.\.\. Name them",
         ),
         ({"a.csv": ""}, "a.csv: not a table"),
         ({"a.csv": INTERACTION.splitlines()[0]}, "no road user is in it"),
@@ -231,6 +243,12 @@ def test_moving_objects_of_osi(tmp_path: Path) -> None:
     inside = field(7, messages[0])
     view.write_bytes(struct.pack("<I", len(inside)) + inside)
     assert read_recorded_traffic(view).rows.height == 1
+    endless = b"\x08" + b"\xff" * 100_000
+    view.write_bytes(struct.pack("<I", len(endless)) + endless)
+    with pytest.raises(
+        InputError, match="message 1 at byte 4: it is no message of OSI: a number has"
+    ):
+        read_recorded_traffic(view)
     file.write_bytes(file.read_bytes()[:-5])
     with pytest.raises(InputError, match=r"trace.osi: message 2 at byte \d+: it has \d+ of its"):
         read_recorded_traffic(file)
@@ -254,6 +272,14 @@ def test_mcap_is_read_as_osi_is(packing: str, tmp_path: Path) -> None:
     file.write_bytes(b"no MCAP at all, whatever its ending says")
     with pytest.raises(InputError, match=r"trace\.mcap: it is no MCAP"):
         read_recorded_traffic(file)
+
+
+def test_values_of_no_body_are_taken_as_none(tmp_path: Path) -> None:
+    text = INTERACTION.replace("3,4,0.9273,4,1.8\n1,2", "1e200,inf,1e308,1e30,nan\n1,2")
+    rows = read_recorded_traffic(write(tmp_path, {"a_000.csv": text})).rows
+    first = state(rows, "1")
+    assert (first["speed"], first["length"], first["width"]) == (pytest.approx(5.0), None, None)
+    assert first["hdg"] == pytest.approx(0.9273, abs=1e-4)
 
 
 COMMONROAD = """<commonRoad timeStepSize="0.1">

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from odscen.base.errors import InputError
+from odscen.base.given_arrays import arrays_from_npz, npz_bytes
 from odscen.learning.behaviour.behaviour_model import LightAhead
 from odscen.learning.behaviour.imitation_driver import (
     FEATURES,
@@ -25,8 +28,39 @@ def test_the_weights_that_ship_are_small_and_whole() -> None:
     assert len(data) < 1_000_000
     network = network_from_bytes(data, file="shipped")
     assert network.weights[0].shape[0] == len(FEATURES)
-    with pytest.raises(InputError, match="no weights of a driver"):
+    with pytest.raises(InputError, match=r"cut\.npz: it cannot be read"):
         network_from_bytes(data[:-100], file="cut.npz")
+    with pytest.raises(InputError, match="there are no weights w5"):
+        network_from_bytes(changed(data, "w5", None), file="short.npz")
+    with pytest.raises(InputError, match="No such file"):
+        ImitationDriver(weights="nowhere.npz")
+
+
+def changed(data: bytes, name: str, array: Any) -> bytes:
+    """The same file with another array of a name, or without one."""
+    arrays = arrays_from_npz(data)
+    arrays.pop(name)
+    return npz_bytes(arrays if array is None else {**arrays, name: array})
+
+
+@pytest.mark.parametrize(
+    ("name", "array", "problem"),
+    [
+        ("w0", np.full((12, 32), np.nan, np.float32), "weights w0 are no numbers from -1e"),
+        ("w1", np.full(32, 1e30, np.float32), "weights w1 are no numbers from -1e"),
+        ("w2", np.zeros((32, 32), np.int64), "weights w2 are no numbers from -1e"),
+        ("w2", np.zeros((32, 31), np.float32), r"weights \(32, 31\) and \(32,\) of layer 2"),
+        ("w3", np.zeros((32, 1), np.float32), r"of layer 2 do not fit 32 inputs"),
+        ("w4", np.array(["a"] * 32), "weights w4 are no numbers"),
+        ("more", np.zeros(9_000_000), "its arrays have 72,0.* bytes; 64,000,000 are the most"),
+    ],
+)
+def test_weights_that_nobody_can_compute_with_are_refused(
+    name: str, array: Any, problem: str
+) -> None:
+    arrays = {**arrays_from_npz(shipped_weights()), name: array}
+    with pytest.raises(InputError, match=problem):
+        network_from_bytes(npz_bytes(arrays), file="w.npz")
 
 
 def test_it_drives_on_when_free_and_brakes_behind_somebody_slow_and_before_red() -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from odscen.base.errors import InputError
+from odscen.base.given_arrays import arrays_from_npz, npz_bytes
 from odscen.learning.behaviour.light_model import (
     KEEP,
     LightFacts,
@@ -108,5 +110,14 @@ def test_an_agent_is_the_same_after_a_file_and_others_are_refused() -> None:
     again = SignalAgent.from_bytes(agent.to_bytes(), file="agent.npz")
     assert again.about == {"seed": 2}
     assert again.to_bytes() == agent.to_bytes()
-    with pytest.raises(InputError, match=r"agent\.npz: no agent for lights"):
+    with pytest.raises(InputError, match=r"agent\.npz: it cannot be read as an \.npz file"):
         SignalAgent.from_bytes(b"PK", file="agent.npz")
+    one = io.BytesIO()
+    np.save(one, np.ones(3))
+    with pytest.raises(InputError, match="a single array"):
+        SignalAgent.from_bytes(one.getvalue(), file="agent.npz")
+    arrays = arrays_from_npz(agent.to_bytes())
+    for about in ("[1]", "[" * 100_000):
+        told = npz_bytes({**arrays, "about": np.array(about)})
+        with pytest.raises(InputError, match=r"agent\.npz: not an agent for lights"):
+            SignalAgent.from_bytes(told, file="agent.npz")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,8 +11,10 @@ import numpy as np
 import pytest
 
 from odscen.app.doctor import examine
+from odscen.app.exchange import kept_recordings
 from odscen.app.exchange.imports import DiskFile
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, LimitError
+from odscen.base.folder_locks import locked
 from odscen.formats.tracks.read_recording import choose_recording
 from odscen.maps.store import Workspace
 from tests.formats.tracks.test_tracks_on_maps import crossing_traffic
@@ -178,6 +181,64 @@ def test_of_several_files_the_tracks_are_read(tmp_path: Path) -> None:
         choose_recording([*levelx, both[1]])
     with pytest.raises(InputError, match="none of the files has tracks"):
         choose_recording(levelx[:2])
+
+
+def test_recordings_of_one_name_that_come_together_are_both_kept(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    file = tmp_path / "crossing.csv"
+    crossing_traffic().write_csv(file)
+    sent = [kept_recordings.SentPath(file.name, file)]
+    names = []
+
+    def add(*_: object) -> None:
+        if not names:
+            names.append("being added")
+            kept = kept_recordings.add_recording(workspace, sent, progress=lambda *_: None)
+            names.append(kept.name)
+
+    def begin_other(step: str, _: float) -> None:
+        if "placing" in step:  # while the first has its name
+            add()
+
+    first = kept_recordings.add_recording(workspace, sent, progress=begin_other)
+    assert [first.name, *names[1:]] == ["crossing", "crossing-2"]
+    assert sorted(kept_recordings.recording_names(workspace)) == ["crossing", "crossing-2"]
+    twice = [kept_recordings.SentPath(name, file) for name in ("a.csv", "b/a.csv")]
+    with pytest.raises(InputError, match=r"several files that were sent are called a\.csv"):
+        kept_recordings.add_recording(workspace, twice, progress=lambda *_: None)
+
+
+def test_a_recording_that_is_being_placed_is_not_deleted_and_put_back(
+    client: TestClient, workspace: Workspace, recording: str
+) -> None:
+    folder = workspace.recordings / recording
+    with locked(folder, what="it"):
+        refused = client.delete(f"/api/recordings/{recording}")
+        assert refused.status_code == 409
+        assert "in the hands of" in refused.text
+    assert client.delete(f"/api/recordings/{recording}").status_code == 204
+    assert not list(workspace.recordings.iterdir())
+
+
+def test_of_a_recording_with_too_much_a_part_is_kept_or_asked_for(
+    workspace: Workspace, recording: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = workspace.recordings / recording
+    place = {"folder": str(folder), "workspace": str(workspace.root), "find": False, "added": []}
+    more = {"map_name": "signal_crossing", "offset": "", "estimate": False}
+    monkeypatch.setattr(kept_recordings, "MOST_SCENES", 1)
+    kept_recordings.place_kept_recording(**place, **more, progress=lambda *_: None)
+    about = json.loads((folder / "about.json").read_text())
+    assert len(about["scenes"]) == 1
+    assert "more scenes, which are not listed" in about["summary"]["notes"][-1]
+    (folder / "files").mkdir()
+    crossing_traffic().write_csv(folder / "files" / "t.csv")
+    monkeypatch.setattr(kept_recordings, "MOST_USERS", 3)
+    with pytest.raises(LimitError, match=r"t\.csv: 4 road users are more than 3; send a part"):
+        kept_recordings.read_sent_recording(
+            folder=str(folder), names=["t.csv"], progress=lambda *_: None
+        )
 
 
 def test_what_is_no_recording_is_refused_with_its_place(client: TestClient) -> None:

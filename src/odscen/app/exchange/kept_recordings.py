@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import count
@@ -32,9 +32,9 @@ from odscen.base.checksums import (
     sums_of,
     write_sums,
 )
-from odscen.base.errors import InputError, NotFoundError
+from odscen.base.errors import ConflictError, InputError, LimitError, NotFoundError
 from odscen.base.folder_locks import locked
-from odscen.base.shown import printable
+from odscen.base.shown import printable, some_of
 from odscen.base.system_errors import disk_errors
 from odscen.formats.base import VERDICTS, ElementReport, ImportMap
 from odscen.formats.tracks.lane_places import estimate_offset, share_on_lanes
@@ -61,6 +61,10 @@ _ABOUT, _TRACKS, _PLACED = "about.json", "tracks.parquet", "placed.parquet"
 _PICTURE: Final = "agreement.svg"
 _FILES: Final = "files"
 _MOST_FILES: Final = 40
+MOST_USERS: Final = 50_000
+"""Road users of a recording that is kept; those of highD have 3,000 at most."""
+MOST_SCENES: Final = 10_000
+"""Scenes that are kept of it, the first ones; how many there are is said of all."""
 _MAP_ENDINGS: Final = (".xodr", ".osm", ".osm.gz", ".osm.bz2", ".pbf")
 _ON_MAP: Final = 0.8
 """Share of the states of moving vehicles on lanes from which on a map of the workspace is taken to
@@ -187,9 +191,14 @@ def remove_recording(workspace: Workspace, name: str) -> None:
     ------
     NotFoundError
         If there is none of that name.
+    ConflictError
+        If it is being placed on a map.
     """
     folder = _recording_folder(workspace, name)
-    with disk_errors(f"recording {name!r}"):
+    what = f"recording {name!r}"
+    # Who places it now would put it back.
+    with disk_errors(what), locked(folder, what=what):
+        _recording_folder(workspace, name)
         discard(folder)
 
 
@@ -229,6 +238,9 @@ def add_recording(
     if len(files) > _MOST_FILES:
         raise InputError(f"more than {_MOST_FILES} files were sent")
     named = [SentPath(_safe_name(sent.name), sent.path) for sent in files]
+    names = [sent.name for sent in named]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(f"several files that were sent are called {some_of(twice)}")
     maps = [sent for sent in named if sent.name.lower().endswith(_MAP_ENDINGS)]
     tracks = [sent for sent in named if sent not in maps]
     if not tracks:
@@ -367,11 +379,12 @@ def scenario_of_recording(
         raise InputError("a scenario needs a map: choose the one that the recording is of")
     if not begin < end:
         raise InputError(f"the window from {begin:g} to {end:g} s is empty")
-    rows = (
-        pl.scan_parquet(kept.checked(_PLACED))
-        .filter(pl.col("time").is_between(begin - 1e-6, end + 1e-6))
-        .collect()
-    )
+    with disk_errors(f"recording {name!r}"):
+        rows = (
+            pl.scan_parquet(kept.checked(_PLACED))
+            .filter(pl.col("time").is_between(begin - 1e-6, end + 1e-6))
+            .collect()
+        )
     if not rows.height:
         raise InputError(f"the recording has no road user from {begin:g} to {end:g} s")
     entry = workspace.map_for(about["map"], about["map_sha256"])
@@ -453,14 +466,18 @@ def _free_name(stem: str, taken: Sequence[str]) -> str:
 @contextmanager
 def _new_recording(workspace: Workspace, stem: str) -> Iterator[tuple[str, Path]]:
     """Yield a free name, and the folder that becomes that recording."""
-    name = check_name(_free_name(stem, recording_names(workspace)), what="recording")
-    final = workspace.recordings / name
-    with (
-        disk_errors("recordings"),
-        locked(final, what=f"recording {name!r}"),
-        new_folder(final) as folder,
-    ):
-        yield name, folder
+    with disk_errors("recordings"), ExitStack() as stack:
+        taken = recording_names(workspace)
+        while True:
+            name = check_name(_free_name(stem, taken), what="recording")
+            final = workspace.recordings / name
+            taken.append(name)
+            with suppress(ConflictError):  # one of that name is being made beside us
+                stack.enter_context(locked(final, what=f"recording {name!r}"))
+                if not final.exists():  # nor has been since
+                    break
+                stack.close()
+        yield name, stack.enter_context(new_folder(final))
 
 
 def _read_in_child(
@@ -528,6 +545,11 @@ def read_sent_recording(
     files = [DiskFile(place / _FILES / name) for name in names]
     main = files[choose_recording(files)]
     recorded = read_recording(main)
+    users = recorded.rows["id"].n_unique()
+    if users > MOST_USERS:
+        raise LimitError(
+            f"{main.name}: {users:,} road users are more than {MOST_USERS:,}; send a part of it"
+        )
     recorded.rows.write_parquet(place / _TRACKS)
     needed = {main.name, *recorded_beside(main.name, names)}
     about = {
@@ -592,6 +614,9 @@ def place_kept_recording(
     progress("writing it by time", 0.8)
     shown.rows.write_parquet(place / _PLACED)
     users, origin = write_moments(shown.rows, place)
+    if shown.scenes.height > MOST_SCENES:
+        more = shown.scenes.height - MOST_SCENES
+        about["summary"]["notes"].append(f"and {more:,} more scenes, which are not listed")
     about |= {
         "map": None if entry is None else entry.name,
         "map_sha256": None if entry is None else entry.sha256,
@@ -606,7 +631,7 @@ def place_kept_recording(
             for least in ("min", "max")
             for axis in ("x", "y")
         ],
-        "scenes": shown.scenes.to_dicts(),
+        "scenes": shown.scenes.head(MOST_SCENES).to_dicts(),
     }
     (place / _ABOUT).write_text(json.dumps(about), encoding="utf-8")
     return {}

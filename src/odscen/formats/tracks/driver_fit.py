@@ -20,6 +20,7 @@ import polars as pl
 
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
+from odscen.formats.tracks.close_pairs import find_close_pairs
 from odscen.formats.tracks.scenes import known_sizes
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.problems import validated
@@ -233,16 +234,20 @@ def find_followings(rows: pl.DataFrame) -> list[Following]:
 def _find_leaders(places: FloatArray) -> tuple[Any, FloatArray]:
     """Row of the next one ahead in the path of each, or -1, and metres between the bodies."""
     x, y, hdg, length, width = places.T
-    dx, dy = x[None, :] - x[:, None], y[None, :] - y[:, None]
-    c, s = np.cos(hdg)[:, None], np.sin(hdg)[:, None]
-    ahead, left = dx * c + dy * s, dy * c - dx * s
-    turn = np.abs(np.remainder(hdg[None, :] - hdg[:, None] + np.pi, 2.0 * np.pi) - np.pi)
-    meets = (ahead > 0.0) & (ahead < _SIGHT) & (turn < _ALIGNED)
-    meets &= np.abs(left) < (width[:, None] + width[None, :]) / 2.0
-    gap = np.where(meets, ahead - (length[:, None] + length[None, :]) / 2.0, np.inf)
-    leader = np.argmin(gap, axis=1)
-    least = gap[np.arange(len(x)), leader]
-    return np.where(np.isfinite(least), leader, -1), np.maximum(least, 0.0)
+    leader, least = np.full(len(x), -1), np.full(len(x), np.inf)
+    for i, j in find_close_pairs(x, y, math.hypot(_SIGHT, width.max())):
+        dx, dy = x[j] - x[i], y[j] - y[i]
+        c, s = np.cos(hdg)[i], np.sin(hdg)[i]
+        ahead, left = dx * c + dy * s, dy * c - dx * s
+        turn = np.abs(np.remainder(hdg[j] - hdg[i] + np.pi, 2.0 * np.pi) - np.pi)
+        meets = (ahead > 0.0) & (ahead < _SIGHT) & (turn < _ALIGNED)
+        meets &= np.abs(left) < (width[i] + width[j]) / 2.0
+        own, other = i[meets], j[meets]
+        gap = ahead[meets] - (length[own] + length[other]) / 2.0
+        order = np.lexsort((other, gap, own))  # of those ahead of one, the nearest comes first
+        rows, first = np.unique(own[order], return_index=True)
+        leader[rows], least[rows] = other[order][first], gap[order][first]
+    return leader, np.maximum(least, 0.0)
 
 
 # ---------------------------------------------------------------------------- the models

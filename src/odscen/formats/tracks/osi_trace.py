@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import polars as pl
 
 from odscen.base.errors import InputError, MissingDependencyError
+from odscen.base.shown import printable
 from odscen.formats.tracks.recorded_traffic import RecordedTraffic, complete_tracks
 
 if TYPE_CHECKING:
@@ -50,6 +51,8 @@ _ID, _BASE, _TYPE, _CLASSIFICATION = 1, 2, 3, 6
 _DIMENSION, _POSITION, _ORIENTATION, _VELOCITY, _ACCELERATION = 1, 2, 3, 4, 5
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _MOST_MESSAGE = 1 << 30
+_LONGEST_SHIFT = 63
+"""Of the last of the ten bytes that a number has at most."""
 
 
 class _Row(NamedTuple):
@@ -122,7 +125,6 @@ def _read_messages(file: Path) -> Iterator[tuple[int, int, bytes, bool]]:
 
 def _mcap_messages(file: Path) -> Iterator[tuple[int, int, bytes, bool]]:
     try:
-        from mcap.exceptions import McapError
         from mcap.reader import make_reader
     except ImportError as error:
         raise MissingDependencyError(
@@ -134,8 +136,8 @@ def _mcap_messages(file: Path) -> Iterator[tuple[int, int, bytes, bool]]:
             for number, (schema, _, message) in enumerate(make_reader(stream).iter_messages(), 1):
                 if schema is not None and schema.name in wanted:
                     yield number, message.log_time, message.data, wanted[schema.name]
-    except (McapError, OSError, struct.error) as error:
-        raise InputError(f"it is no MCAP: {error}") from error
+    except Exception as error:  # of that package and its packings, whatever damage leads to
+        raise InputError(f"it is no MCAP: {printable(str(error))}") from error
 
 
 def osi_fields(content: bytes) -> Iterator[tuple[int, Any]]:
@@ -178,6 +180,8 @@ def _varint(content: bytes, at: int) -> tuple[int, int]:
     while True:
         byte = content[at]
         at += 1
+        if shift > _LONGEST_SHIFT:
+            raise ValueError("a number has more than ten bytes")
         value |= (byte & 127) << shift
         if byte < 128:
             return value, at

@@ -42,6 +42,12 @@ heading), ``length``, ``width`` (m, null if the file has none) and ``quality``: 
 ``after_gap`` (frames before it are missing) or ``fragment`` (the file doubts it)."""
 
 _MOST_ROWS = 100_000
+_FARTHEST: Final = {"time": 1e11, "x": 1e8, "y": 1e8}
+"""Seconds (of any clock that began in the last 3,000 years) and metres beyond which nothing is."""
+_LARGEST_BODY = 1000.0
+_MOST_ANGLE = 1e6
+_FASTEST = 1e4
+"""m/s, and m/s² of an acceleration; above it a value is an error of the file, and derived anew."""
 _LISTED = 8
 """Names that a message lists at most."""
 _MOVED = 0.05
@@ -166,7 +172,12 @@ def complete_tracks(
         ),
     ).with_columns(
         # A length of 0 is how inD says that it has none, for pedestrians and cyclists.
-        *(pl.when(pl.col(name) > 0).then(pl.col(name)).alias(name) for name in ("length", "width"))
+        *(
+            pl.when((pl.col(name) > 0) & (pl.col(name) <= _LARGEST_BODY))
+            .then(pl.col(name))
+            .alias(name)
+            for name in ("length", "width")
+        )
     )
     if from_front:
         half = pl.col("length").cast(pl.Float64).fill_null(0.0) / 2.0
@@ -182,12 +193,20 @@ def complete_tracks(
 
 
 def _refuse_numbers_that_are_none(rows: pl.DataFrame) -> None:
-    for name in ("time", "x", "y"):
-        wrong = rows.filter(~pl.col(name).is_finite().fill_null(value=False))
+    for name, most in _FARTHEST.items():
+        # No comparison holds of what is no number.
+        wrong = rows.filter(
+            ~(pl.col(name).is_finite() & (pl.col(name).abs() <= most)).fill_null(value=False)
+        )
         if wrong.height:
             row = wrong.row(0, named=True)
+            problem = (
+                f"not a number up to {most:g}"
+                if row[name] is not None and math.isfinite(row[name])
+                else "not a finite number"
+            )
             raise InputError(
-                f"{name} is {row[name]}, not a finite number",
+                f"{name} is {row[name]}, {problem}",
                 element=f"road user {row['id']} at {row['time']} s",
             )
 
@@ -223,7 +242,8 @@ def _heading_of(columns: list[str]) -> pl.Expr:
     if "hdg" not in columns:
         return derived
     turned = _without_whole_turns(pl.col("hdg"))
-    return pl.when(pl.col("hdg").is_finite()).then(turned).otherwise(derived)
+    # Of an angle with so many turns nothing is left but rounding.
+    return pl.when(pl.col("hdg").abs() <= _MOST_ANGLE).then(turned).otherwise(derived)
 
 
 def _without_whole_turns(angle: pl.Expr) -> pl.Expr:
@@ -231,22 +251,29 @@ def _without_whole_turns(angle: pl.Expr) -> pl.Expr:
 
 
 def _speed_of(columns: list[str]) -> pl.Expr:
-    if "speed" in columns:
-        return pl.col("speed").abs()
-    if "vx" in columns:
-        return (pl.col("vx") ** 2 + pl.col("vy") ** 2).sqrt()
     way = (_between_neighbours("x") ** 2 + _between_neighbours("y") ** 2).sqrt()
     time = _between_neighbours("time")
-    return pl.when(time > 0).then(way / time).otherwise(0.0)
+    derived = pl.when(time > 0).then((way / time).clip(0.0, _FASTEST)).otherwise(0.0)
+    if "speed" in columns:
+        given = pl.col("speed").abs()
+    elif "vx" in columns:
+        given = (pl.col("vx") ** 2 + pl.col("vy") ** 2).sqrt()
+    else:
+        return derived
+    return pl.when(given <= _FASTEST).then(given).otherwise(derived)
 
 
 def _acceleration_of(columns: list[str]) -> pl.Expr:
-    if "acceleration" in columns:
-        return pl.col("acceleration")
-    if "ax" in columns:
-        return pl.col("ax") * pl.col("hdg").cos() + pl.col("ay") * pl.col("hdg").sin()
     time = _between_neighbours("time")
-    return pl.when(time > 0).then(_between_neighbours("speed") / time).otherwise(0.0)
+    change = (_between_neighbours("speed") / time).clip(-_FASTEST, _FASTEST)
+    derived = pl.when(time > 0).then(change).otherwise(0.0)
+    if "acceleration" in columns:
+        given = pl.col("acceleration")
+    elif "ax" in columns:
+        given = pl.col("ax") * pl.col("hdg").cos() + pl.col("ay") * pl.col("hdg").sin()
+    else:
+        return derived
+    return pl.when(given.abs() <= _FASTEST).then(given).otherwise(derived)
 
 
 def _category_of_kind() -> pl.Expr:

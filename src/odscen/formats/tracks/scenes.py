@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -9,11 +10,12 @@ import numpy as np
 import polars as pl
 
 from odscen.base.categories import DEFAULT_BODY, Category
+from odscen.formats.tracks.close_pairs import find_close_pairs, find_crossings
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from odscen.base.arrays import FloatArray
+    from odscen.base.arrays import FloatArray, IntArray
     from odscen.lanegraph.graphs import MapGraph
 
 HARD_BRAKING: Final = 4.5
@@ -163,14 +165,18 @@ def _frames_of_short_ttc(vehicles: pl.DataFrame) -> Iterator[_Frame]:
         if end - begin < 2:
             continue
         part = values[begin:end]
-        seconds = _times_to_collision(part)
-        for i, j in np.argwhere(seconds < SHORT_TTC).tolist():
-            x, y, time = part[i, 0], part[i, 1], part[i, 6]
-            yield _Frame(names[begin + i], names[begin + j], time, x, y, float(seconds[i, j]))
+        longest, widest = part[:, 4].max(), part[:, 5].max()
+        reach = math.hypot(_SIGHT, longest / 2.0 + 1.5 * widest)
+        for i, j in find_close_pairs(part[:, 0], part[:, 1], reach):
+            seconds = _times_to_collision(part, i, j)
+            for k in np.flatnonzero(seconds < SHORT_TTC).tolist():
+                own, other = begin + int(i[k]), begin + int(j[k])
+                x, y, time = values[own, 0], values[own, 1], values[own, 6]
+                yield _Frame(names[own], names[other], time, x, y, float(seconds[k]))
 
 
-def _times_to_collision(states: FloatArray) -> FloatArray:
-    """Seconds, shape ``(N, N)``, of each to each that is ahead in its path; inf if there is none.
+def _times_to_collision(states: FloatArray, i: IntArray, j: IntArray) -> FloatArray:
+    """Seconds, shape ``(P,)``, of rows ``i`` to rows ``j`` ahead in their paths; inf if none is.
 
     Parameters
     ----------
@@ -178,15 +184,15 @@ def _times_to_collision(states: FloatArray) -> FloatArray:
         ``x``, ``y``, ``hdg``, ``speed``, ``length``, ``width``, shape ``(N, 6)`` or more.
     """
     x, y, hdg, speed, length, width = states[:, :6].T
-    dx, dy = x[None, :] - x[:, None], y[None, :] - y[:, None]
-    c, s = np.cos(hdg)[:, None], np.sin(hdg)[:, None]
+    dx, dy = x[j] - x[i], y[j] - y[i]
+    c, s = np.cos(hdg)[i], np.sin(hdg)[i]
     ahead, left = dx * c + dy * s, dy * c - dx * s
-    turn = hdg[None, :] - hdg[:, None]
-    along = np.abs(np.cos(turn)) * length / 2.0 + np.abs(np.sin(turn)) * width / 2.0
-    across = np.abs(np.sin(turn)) * length / 2.0 + np.abs(np.cos(turn)) * width / 2.0
-    gap = np.maximum(ahead - length[:, None] / 2.0 - along, 0.0)
-    closing = speed[:, None] - speed[None, :] * np.cos(turn)
-    meets = (ahead > 0.0) & (ahead < _SIGHT) & (np.abs(left) < width[:, None] / 2.0 + across)
+    turn = hdg[j] - hdg[i]
+    along = np.abs(np.cos(turn)) * length[j] / 2.0 + np.abs(np.sin(turn)) * width[j] / 2.0
+    across = np.abs(np.sin(turn)) * length[j] / 2.0 + np.abs(np.cos(turn)) * width[j] / 2.0
+    gap = np.maximum(ahead - length[i] / 2.0 - along, 0.0)
+    closing = speed[i] - speed[j] * np.cos(turn)
+    meets = (ahead > 0.0) & (ahead < _SIGHT) & (np.abs(left) < width[i] / 2.0 + across)
     meets &= closing > 1e-3
     return np.where(meets, gap / np.where(meets, closing, 1.0), np.inf)
 
@@ -209,11 +215,11 @@ def _lane_changes(
             pair = int(rows[k]), int(rows[k + 1])
             if pair not in beside:
                 continue
-            soon = rows[k + 1 :][time[k + 1 :] <= time[k + 1] + _APART]
-            if rows[k] in soon:
+            soon = int(np.searchsorted(time, time[k + 1] + _APART, "right"))
+            if rows[k] in rows[k + 1 : soon]:
                 continue
-            before = rows[: k + 1][time[: k + 1] >= time[k] - _APART]
-            if rows[k + 1] in before:
+            before = int(np.searchsorted(time, time[k] - _APART))
+            if rows[k + 1] in rows[before : k + 1]:
                 continue
             yield str(user), None, time[k], time[k + 1], x[k + 1], y[k + 1], beside[pair]
 
@@ -222,8 +228,11 @@ def _cut_ins(
     vehicles: pl.DataFrame, changes: Iterable[tuple[str, None, float, float, float, float, float]]
 ) -> Iterator[tuple[Any, ...]]:
     """Changes of lanes close before another vehicle of the new lane."""
+    by_time = vehicles.sort("time")
+    times = by_time["time"].to_numpy()
     for user, _, begin, end, x, y, _ in changes:
-        there = vehicles.filter((pl.col("time") - end).abs() < 1e-6)
+        first, past = np.searchsorted(times, (end - 1e-6, end + 1e-6)).tolist()
+        there = by_time.slice(first, past - first)
         own = there.row(there["id"].to_list().index(user), named=True)
         others = there.filter(
             (pl.col("id") != user) & (pl.col("lane") == own["lane"]) & pl.col("on_lane")
@@ -245,51 +254,21 @@ def _crossing_pedestrians(
     walkers: pl.DataFrame, vehicles: pl.DataFrame
 ) -> Iterator[tuple[Any, ...]]:
     """Pedestrians whose track crosses that of a vehicle soon before or after it."""
-    each = [tracks.group_by("id", maintain_order=True) for tracks in (vehicles, walkers)]
-    driven = [(user, *_line_of(own)) for (user,), own in each[0]]
-    for (walker,), own in each[1]:
-        times, line = _line_of(own)
-        for vehicle, other_times, other_line in driven:
-            if (
-                other_times[0] > times[-1] + SHORT_PET
-                or times[0] > other_times[-1] + SHORT_PET
-                or (line.min(axis=0) > other_line.max(axis=0)).any()
-                or (other_line.min(axis=0) > line.max(axis=0)).any()
-            ):
-                continue
-            for place, walked, drove in _find_crossings(line, times, other_line, other_times):
-                if abs(walked - drove) < SHORT_PET:
-                    times_there = sorted((walked, drove))
-                    apart = times_there[1] - times_there[0]
-                    yield ("crossing_pedestrian", walker, vehicle, *times_there, *place, apart)
-                    break
+    each = [
+        [(str(user), _line_of(own)) for (user,), own in tracks.group_by("id", maintain_order=True)]
+        for tracks in (walkers, vehicles)
+    ]
+    lines = [[line for _, line in tracks] for tracks in each]
+    for found in find_crossings(*lines, within=SHORT_PET):
+        early, late = sorted((found.a_time, found.b_time))
+        pair = each[0][found.a][0], each[1][found.b][0]
+        yield ("crossing_pedestrian", *pair, early, late, found.x, found.y, late - early)
 
 
-def _line_of(own: pl.DataFrame) -> tuple[FloatArray, FloatArray]:
-    """Times, and places some distance apart, of a track."""
-    times, line = own["time"].to_numpy(), own.select("x", "y").to_numpy()
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+def _line_of(own: pl.DataFrame) -> FloatArray:
+    """Times, and places some distance apart, of a track: shape ``(N, 3)``."""
+    points = own.select("time", "x", "y").to_numpy()
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, 1:], axis=0).T))])
     cells = np.unique(way // _CELL, return_index=True)[1]
-    kept = np.unique([*cells.tolist(), len(line) - 1])
-    return times[kept], line[kept]
-
-
-def _find_crossings(
-    a: FloatArray, a_times: FloatArray, b: FloatArray, b_times: FloatArray
-) -> Iterator[tuple[tuple[float, float], float, float]]:
-    """Where two lines cross, and when each is there; in the order of the first."""
-    p, r = a[:-1, None, :], np.diff(a, axis=0)[:, None, :]
-    q, s = b[None, :-1, :], np.diff(b, axis=0)[None, :, :]
-    cross = r[..., 0] * s[..., 1] - r[..., 1] * s[..., 0]
-    away = q - p
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = (away[..., 0] * s[..., 1] - away[..., 1] * s[..., 0]) / cross
-        u = (away[..., 0] * r[..., 1] - away[..., 1] * r[..., 0]) / cross
-    hit = (cross != 0.0) & (t >= 0.0) & (t < 1.0) & (u >= 0.0) & (u < 1.0)
-    for i, j in np.argwhere(hit).tolist():
-        place = a[i] + t[i, j] * (a[i + 1] - a[i])
-        yield (
-            (float(place[0]), float(place[1])),
-            float(a_times[i] + t[i, j] * (a_times[i + 1] - a_times[i])),
-            float(b_times[j] + u[i, j] * (b_times[j + 1] - b_times[j])),
-        )
+    kept: FloatArray = points[np.unique([*cells.tolist(), len(points) - 1])]
+    return kept

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import polars as pl
 
 from odscen.base.errors import InputError, in_file
-from odscen.base.shown import shown
+from odscen.base.shown import shown, shown_id
 from odscen.formats.tracks.osi_trace import OSI_OBJECTS, OSI_VEHICLE, OSI_VEHICLES
 from odscen.formats.tracks.recorded_traffic import RecordedTraffic, complete_tracks
 
@@ -82,6 +82,7 @@ class TrackFile:
         for expression in (*expressions, *(() if where is None else (where,))):
             self.used.update(expression.meta.root_names())
         inside = pl.col("time").is_between(self.window.begin - _SAME, self.window.end + _SAME)
+        inside |= ~pl.col("time").is_finite()  # a row of no time is refused later, and not lost
         return _collect_table(self.file, columns, table.select(expressions).filter(inside))
 
     def beside(self, ending: str, other: str) -> GivenFile:
@@ -146,7 +147,7 @@ def _read_with_schema(given: TrackFile) -> RecordedTraffic:
     known = ", ".join(("ngsim", *(schema.id for schema in SCHEMAS)))
     raise InputError(
         f"its columns are those of no schema that is known ({known}); there are "
-        f"{', '.join(given.columns)}. Name them: --option columns=time=TIME,id=ID,x=X,y=Y"
+        f"{_list_names(given.columns)}. Name them: --option columns=time=TIME,id=ID,x=X,y=Y"
     )
 
 
@@ -200,7 +201,7 @@ def _refuse_wrong_value(file: GivenFile, types: Types) -> None:
 
 
 def _list_names(names: Sequence[object]) -> str:
-    listed = ", ".join(str(name) for name in names[:_LISTED])
+    listed = ", ".join(shown_id(str(name)) for name in names[:_LISTED])
     return listed + (", ..." if len(names) > _LISTED else "")
 
 
@@ -555,7 +556,7 @@ def _read_named_columns(given: TrackFile) -> RecordedTraffic:
             raise InputError(f"it is not ROLE=COLUMN of one of {', '.join(_ROLES)}", element=where)
         if name not in given.columns:
             raise InputError(
-                f"no column {name}; there are {', '.join(given.columns)}", element=where
+                f"no column {name}; there are {_list_names(given.columns)}", element=where
             )
         try:
             named[role] = name, float(factor)

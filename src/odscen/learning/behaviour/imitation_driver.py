@@ -13,15 +13,22 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 
-from odscen.base.errors import InputError
+from odscen.base.errors import in_file
+from odscen.base.given_arrays import arrays_from_npz
+from odscen.base.given_files import as_path, read_given
 from odscen.learning.behaviour.behaviour_model import DrivingAction, LightAhead
 from odscen.learning.behaviour.intelligent_driver import desired_speeds
 from odscen.learning.offered_options import offered
-from odscen.learning.reference.traffic_model import SmallNetwork, new_network, softmax, trained
+from odscen.learning.reference.traffic_model import (
+    MOST_WEIGHTS,
+    SmallNetwork,
+    new_network,
+    softmax,
+    trained,
+)
 
 if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
@@ -64,10 +71,12 @@ class ImitationDriver:
         False, "Accelerations drawn", meaning="else the mean of what was learned"
     )
 
+    def __post_init__(self) -> None:
+        _network_of(self.weights)  # refused before anything runs
+
     def init(self, rng: np.random.Generator, scene: BehaviourScene) -> tuple[Any, ...]:
         """Read the weights."""
-        data = Path(self.weights).read_bytes() if self.weights else shipped_weights()
-        return network_from_bytes(data, file=self.weights or _SHIPPED), ImitationState(scene, rng)
+        return _network_of(self.weights), ImitationState(scene, rng)
 
     def act(
         self, observation: RoadObservation, state: tuple[Any, ...]
@@ -134,17 +143,15 @@ def network_from_bytes(data: bytes, *, file: str) -> SmallNetwork:
     InputError
         If they are no weights of this model.
     """
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            weights = tuple(arrays[f"w{k}"] for k in range(6))
-    except (ValueError, KeyError, OSError, EOFError, BadZipFile) as error:
-        raise InputError(f"no weights of a driver: {error}", file=file) from error
-    if weights[0].shape[:1] != (len(FEATURES),) or weights[5].shape != (len(BINS),):
-        shapes = f"{weights[0].shape} and {weights[5].shape}"
-        raise InputError(
-            f"weights {shapes}, not ({len(FEATURES)}, ...) and ({len(BINS)},)", file=file
-        )
-    return SmallNetwork(weights)
+    arrays = arrays_from_npz(data, file=file, most=MOST_WEIGHTS)
+    with in_file(file):
+        return SmallNetwork.from_arrays(arrays, "w", inputs=len(FEATURES), outputs=len(BINS))
+
+
+def _network_of(weights: str) -> SmallNetwork:
+    """Network of a file; the one that ships if none is named."""
+    data = read_given(as_path(weights), most=MOST_WEIGHTS) if weights else shipped_weights()
+    return network_from_bytes(data, file=weights or _SHIPPED)
 
 
 def shipped_weights() -> bytes:

@@ -12,16 +12,22 @@ import io
 import json
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Self
-from zipfile import BadZipFile
 
 import numpy as np
 
-from odscen.base.errors import InputError
-from odscen.base.given_files import as_path
+from odscen.base.errors import InputError, in_file
+from odscen.base.given_arrays import arrays_from_npz
+from odscen.base.given_files import as_path, read_given
+from odscen.base.stored_files import documents
 from odscen.base.text_files import write_file
 from odscen.learning.behaviour.light_model import DECISION_INTERVAL
 from odscen.learning.behaviour.max_pressure import stage_pressure
-from odscen.learning.reference.traffic_model import SmallNetwork, new_network, softmax
+from odscen.learning.reference.traffic_model import (
+    MOST_WEIGHTS,
+    SmallNetwork,
+    new_network,
+    softmax,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -113,16 +119,11 @@ class SignalAgent:
         InputError
             If it is none.
         """
-        try:
-            with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-                weights = tuple(arrays[f"w{k}"] for k in range(6))
-                about = json.loads(str(arrays["about"]))
-        except (ValueError, KeyError, OSError, EOFError, BadZipFile) as error:
-            raise InputError(f"no agent for lights: {error}", file=file) from error
-        if weights[0].shape[:1] != (len(FEATURES),) or weights[5].shape != (1,):
-            shapes = f"{weights[0].shape} and {weights[5].shape}"
-            raise InputError(f"weights {shapes}, not ({len(FEATURES)}, ...) and (1,)", file=file)
-        return cls(SmallNetwork(weights), about)
+        arrays = arrays_from_npz(data, file=file, most=MOST_WEIGHTS)
+        with in_file(file), documents("an agent for lights", RecursionError):
+            about = dict(json.loads(str(arrays["about"])))
+            policy = SmallNetwork.from_arrays(arrays, "w", inputs=len(FEATURES), outputs=1)
+            return cls(policy, about)
 
     @classmethod
     def read(cls, path: GivenPath) -> Self:
@@ -134,11 +135,7 @@ class SignalAgent:
             If it cannot be read, or is no agent.
         """
         file = as_path(path)
-        try:
-            data = file.read_bytes()
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}", file=str(file)) from error
-        return cls.from_bytes(data, file=str(file))
+        return cls.from_bytes(read_given(file, most=MOST_WEIGHTS), file=str(file))
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,26 +19,32 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
-import zlib
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from odscen.base.errors import InputError
+from odscen.base.errors import InputError, in_file
+from odscen.base.given_arrays import arrays_from_npz
+from odscen.base.stored_files import documents
 from odscen.learning.fill import VEHICLES
 from odscen.learning.traffic_snapshots import STOPPED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.learning.fill import Array
 
 
 _BATCH = 1024
+LAYERS = 6
+"""Arrays of a network: a matrix and a vector for each of its three layers."""
+MOST_WEIGHTS = 64_000_000
+"""Bytes of a file of weights, unpacked; those that ship have 11 and 60 kB."""
+_LARGEST_WEIGHT = 1e6
+"""Above it sums are no numbers any more; those that were learned are below 10."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +52,32 @@ class SmallNetwork:
     """Weights of the three layers: matrices ``(in, out)`` and vectors ``(out,)`` in turn."""
 
     weights: tuple[Array, ...]
+
+    @classmethod
+    def from_arrays(
+        cls, arrays: Mapping[str, Array], name: str, *, inputs: int, outputs: int | None = None
+    ) -> Self:
+        """Network of the arrays ``NAME0`` to ``NAME5`` of a file.
+
+        Raises
+        ------
+        InputError
+            If one is missing, is none of its shape, or has values that are no numbers or too large
+            to compute with.
+        """
+        found, width = [], inputs
+        for layer in range(LAYERS // 2):
+            matrix, vector = (_read_weights(arrays, f"{name}{2 * layer + k}") for k in (0, 1))
+            last = layer == LAYERS // 2 - 1
+            wanted = outputs if last and outputs is not None else vector.size
+            if matrix.shape != (width, wanted) or vector.shape != (wanted,):
+                raise InputError(
+                    f"weights {matrix.shape} and {vector.shape} of layer {layer + 1} do not fit "
+                    f"{width} inputs and {wanted} outputs"
+                )
+            found += [matrix, vector]
+            width = wanted
+        return cls(tuple(found))
 
     def __call__(self, x: Array) -> Array:
         """Outputs ``(rows, classes)`` of inputs ``(rows, features)``, float32."""
@@ -69,6 +101,18 @@ class SmallNetwork:
             one.T @ at_two, at_two.sum(axis=0),
             two.T @ error, error.sum(axis=0),
         ]  # fmt: skip
+
+
+def _read_weights(arrays: Mapping[str, Array], name: str) -> Array:
+    """Weights of a file as numbers to compute with."""
+    if name not in arrays:
+        raise InputError(f"there are no weights {name}")
+    found = arrays[name]
+    if found.dtype.kind != "f" or not (np.abs(found) <= _LARGEST_WEIGHT).all():
+        raise InputError(
+            f"weights {name} are no numbers from -{_LARGEST_WEIGHT:g} to {_LARGEST_WEIGHT:g}"
+        )
+    return found.astype(np.float32)
 
 
 def new_network(features: int, hidden: int, outputs: int, rng: np.random.Generator) -> SmallNetwork:
@@ -163,7 +207,6 @@ CLASSES = 29
 LIMIT_BOUNDS = (10.0, 17.0)
 """m/s; categories are counted by speed limit below, between and above."""
 _CONTEXTS = 2 * (len(LIMIT_BOUNDS) + 1)
-_LAYERS = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -243,21 +286,24 @@ def model_from_bytes(data: bytes, *, file: str) -> TrafficModel:
     InputError
         If it is no model.
     """
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+    arrays = arrays_from_npz(data, file=file, most=MOST_WEIGHTS)
+    with in_file(file), documents("a model of traffic", RecursionError):
         head = json.loads(str(arrays["about"][0]))
-        occupied, speed = (
-            SmallNetwork(tuple(arrays[f"{name}_{k}"] for k in range(_LAYERS)))
-            for name in ("occupied", "speed")
-        )
-        categories = arrays["categories"].reshape(_CONTEXTS, len(VEHICLES))
         about, version = head["about"], head["version"]
-    except (
-        zipfile.BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError, TypeError,
-        IndexError,
-    ) as error:  # fmt: skip
-        raise InputError(f"it is no model of traffic: {error}", file=file) from error
+        occupied, speed = (
+            SmallNetwork.from_arrays(
+                arrays, f"{name}_", inputs=arrays[f"{name}_0"].shape[0], outputs=outputs
+            )
+            for name, outputs in (("occupied", 1), ("speed", CLASSES))
+        )
+        columns = occupied.weights[0].shape[0] + len(VEHICLES)
+        if speed.weights[0].shape[0] != columns:
+            raise InputError(
+                f"weights of speeds have {speed.weights[0].shape[0]} inputs, not {columns}"
+            )
+        categories = arrays["categories"].astype(np.float64).reshape(_CONTEXTS, len(VEHICLES))
+        if not ((categories >= 0.0) & (categories <= 1.0)).all():
+            raise InputError("shares of categories are from 0 to 1")
     if version != VERSION:
         raise InputError(f"version is {version}; this odscen reads {VERSION}", file=file)
     return TrafficModel(occupied, speed, categories, about)

@@ -85,7 +85,7 @@ def _parse_points(text: str | None) -> list[PicturePoint]:
     try:
         rows = json.loads(text or "[]")
         return [PicturePoint(*map(float, row)) for row in rows]
-    except (ValueError, TypeError, RecursionError) as error:
+    except (ValueError, TypeError, ArithmeticError, RecursionError) as error:
         raise InputError(
             f"points of a picture are rows of column, row, x and y, as JSON: {error}"
         ) from None
