@@ -370,6 +370,13 @@ def write_tiff_as_png(*, folder: str, progress: Callable[[str, float], None]) ->
     -------
     dict
         ``width``, ``height``, and ``placed`` and ``crs``, which its tags tell.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is too large, or its tags are damaged.
+    MissingDependencyError
+        If Pillow is not installed.
     """
     progress("reading the picture", 0.0)
     sent, made = Path(folder) / _SENT, Path(folder) / _UNPACKED

@@ -160,6 +160,10 @@ def with_text(files: dict[str, str], name: str, old: str, new: str) -> dict[str,
             {"a_000.csv": INTERACTION.replace("2,200", "2,nan")},
             r"a_000.csv: road user 1 at nan s: time is nan, not a finite number",
         ),
+        (
+            {"a_000.csv": INTERACTION.replace("1,2,200", ",2,200")},
+            r"a_000.csv: road user at 0.2 s: it has no id",
+        ),
         (with_text(HIGHD, "01_tracksMeta.csv", "2,12.0", "3,12.0"), "road user 2 .* is not in it"),
         (
             with_text(HIGHD, "01_recordingMeta.csv", "25", "fast"),

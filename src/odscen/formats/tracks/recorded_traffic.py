@@ -193,6 +193,9 @@ def complete_tracks(
 
 
 def _refuse_numbers_that_are_none(rows: pl.DataFrame) -> None:
+    nobody = rows.filter(pl.col("id").is_null())
+    if nobody.height:
+        raise InputError("it has no id", element=f"road user at {nobody['time'][0]} s")
     for name, most in _FARTHEST.items():
         # No comparison holds of what is no number.
         wrong = rows.filter(
