@@ -206,7 +206,7 @@ def run_of_sumo(folder: Path, config: str, *additional: str, net: str) -> Origin
         number = int(edge.get("entered", "0")) + int(edge.get("departed", "0"))
         flows[str(edge.get("id")), hour] += number
     shown: dict[str, list[tuple[float, str]]] = {}
-    for row in etree.parse(folder / "tls.xml").iter("tlsState"):
+    for row in etree.parse(folder / "tls.xml").iter("tlsState") if lights else ():
         own = shown.setdefault(str(row.get("id")), [])
         if not own or own[-1][1] != row.get("state"):
             own.append((float(row.get("time", "")), str(row.get("state"))))
@@ -309,6 +309,47 @@ def test_whom_sumo_ignores_in_a_route_file_is_named_and_not_planned(
         "late.rou.xml: SUMO ignores 2 that depart before those above them, flow 'f' the first; "
         "sort the file by departure, for example with sort_routes.py"
     ]
+
+
+def test_who_departs_before_the_simulation_begins_is_left_out_as_in_sumo(
+    store: Workspace, project: Path
+) -> None:
+    (project / "early.rou.xml").write_text(
+        '<routes><route id="early" edges="A0B0 B0C0"/><vehicle id="a" route="early" depart="40"/>'
+        '<person id="p" depart="60"><walk edges="A0B0 B0C0"/></person>'
+        '<flow id="f" route="early" begin="70" end="130" period="10"/>'
+        '<vehicle id="b" route="early" depart="110"/></routes>'
+    )
+    (project / "early.sumocfg").write_text(
+        '<configuration><input><net-file value="grid.net.xml"/><route-files value="early.rou.xml"/>'
+        '</input><time><begin value="100"/><end value="400"/></time></configuration>'
+    )
+    alone = run_of_sumo(project, "early.sumocfg", net="grid.net.xml")
+    assert sorted(alone.trips) == ["b", "f.0", "f.1", "f.2"]
+    made = import_file(store, project / "early.sumocfg")
+    assert made.scenario is not None
+    done = run(store, made.scenario, name="early")
+    assert sorted(done.actors()["id"]) == sorted(alone.trips)
+    assert set(done.actors()["status"]) == {"arrived"}
+    (note,) = (note for note in done.summary["notes"] if "before it begins" in note)
+    assert note == "SUMO leaves out 2 that depart before it begins at 100 s, 'a' the first"
+
+
+def test_rails_alone_are_refused_in_words(store: Workspace, tmp_path: Path) -> None:
+    (tmp_path / "rails.nod.xml").write_text(
+        '<nodes><node id="a" x="0" y="0"/><node id="b" x="800" y="0"/>'
+        '<node id="c" x="1600" y="40"/></nodes>'
+    )
+    (tmp_path / "rails.edg.xml").write_text(
+        '<edges><edge id="ab" from="a" to="b" allow="rail" speed="30"/>'
+        '<edge id="bc" from="b" to="c" allow="rail" speed="30"/></edges>'
+    )
+    subprocess.run(
+        [BIN / "netconvert", "-n", "rails.nod.xml", "-e", "rails.edg.xml", "-o", "rails.net.xml"],
+        cwd=tmp_path, check=True, capture_output=True,
+    )  # fmt: skip
+    with pytest.raises(InputError, match="the network has no road: odscen has rails and"):
+        import_file(store, tmp_path / "rails.net.xml")
 
 
 def test_nothing_is_written_outside_the_run(finished: Run) -> None:

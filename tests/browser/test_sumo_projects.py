@@ -9,9 +9,13 @@ import polars as pl
 import pytest
 from playwright.sync_api import expect
 
+from odscen.app.maps import load_map
+from odscen.app.running.runs import run
+from odscen.app.scenarios import SUFFIX
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
 from odscen.runs.layout import TRIPS_FILE
+from odscen.runs.recorded import read_lanes
 from tests.app.test_sumo_projects import Original, assert_agrees, original, project
 from tests.browser.test_openscenario import drop
 from tests.browser.test_signals import drag as drag_green
@@ -24,6 +28,25 @@ if TYPE_CHECKING:
 
 __all__ = ["original", "project"]
 FILES = ("run.sumocfg", "grid.net.xml", "sub/cars.rou.xml", "people.rou.xml", "things.add.xml")
+BUSY = "B1B0"
+"""The edge that most vehicles pass: those of flow f on their way, and those of the calibrator."""
+DETOUR = ("A0B0", "C1C0")
+"""Edges of the two ways around it."""
+
+
+def segment_of(store: Workspace, edge: str) -> str:
+    """The segment of the map that a SUMO edge is on."""
+    sumo_map = load_map(store.map("grid")).sumo
+    segment = sumo_map.graph.lanes.segment[sumo_map.edge_nodes[edge][0]]
+    return str(sumo_map.graph.segments.ids[segment])
+
+
+def passages_by_edge(done: Run) -> dict[str, int]:
+    """Vehicles that came onto each SUMO edge, or began there."""
+    lanes = read_lanes(done.folder)
+    assert lanes is not None
+    number = (pl.col("entered") + pl.col("departed")).sum().alias("vehicles")
+    return dict(lanes.group_by("edge").agg(number).rows())
 
 
 def drop_project(user: OdscenPage, project: Path) -> None:
@@ -80,11 +103,13 @@ def test_a_study_of_a_changed_light_and_a_closure_goes_from_drop_to_intervals_by
     page.get_by_role("button", name="Choose it on the map").click()
     page.get_by_role("button", name="Show the whole map").click()
     page.wait_for_timeout(500)
-    roads = [name for name in user.document()["roi"] if "j" not in name]
+    store = Workspace.open(served.workspace)
+    road = segment_of(store, BUSY)
     with user.changing():
-        user.map.click(user.graph.middle(roads[len(roads) // 2]))
+        user.map.click(user.graph.middle(road))
     document = user.document()
     assert [measure["kind"] for measure in document["measures"]] == ["closure"]
+    assert document["measures"][0]["places"] == [road]
     assert document["signals"]["junctions"]
     user.open_catalogue()
     page.get_by_role("link", name="Studies").click()
@@ -100,6 +125,19 @@ def test_a_study_of_a_changed_light_and_a_closure_goes_from_drop_to_intervals_by
     means = page.get_by_role("table", name="Means")
     for name in (before, after):
         expect(means.get_by_role("row").filter(has_text=name)).to_contain_text("±")
-    (table,) = Workspace.open(served.workspace).studies.glob("*/results.parquet")
-    unused = pl.read_parquet(table).group_by("scenario").agg(pl.col("unused_green").mean())
+    (table,) = store.studies.glob("*/results.parquet")
+    results = pl.read_parquet(table)
+    unused = results.group_by("scenario").agg(pl.col("unused_green").mean())
     assert unused.height == unused["unused_green"].n_unique() == 2  # the light was changed
+    # The closed road carried most of the traffic: that goes another way, which takes longer.
+    open_road, closed_road = (
+        passages_by_edge(run(store, store.scenarios / f"{name}{SUFFIX}", name=f"{name}-again"))
+        for name in (before, after)
+    )
+    assert open_road[BUSY] >= 100
+    assert closed_road.get(BUSY, 0) < 10
+    assert sum(closed_road.get(edge, 0) - open_road.get(edge, 0) for edge in DETOUR) >= 90
+    assert closed_road["C0C1"] >= 90  # where they go to
+    for figure in ("vehicle_km", "mean_travel_time"):
+        low, high = results.group_by("scenario").agg(pl.col(figure).mean())[figure].sort()
+        assert high > 1.1 * low, figure

@@ -163,6 +163,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "SUMO has not written the trajectories to the end; the disk may be full: {error}" }),
   msg({ message: "SUMO has traffic lights where the map has none" }),
   msg({ message: "SUMO junction {junction}" }),
+  msg({ message: "SUMO leaves out {early} that depart before it begins at {begin} s, {early2} the first" }),
   msg({ message: "SUMO refused to start: {error}" }),
   msg({ message: "SUMO resumes at {time} s instead of {time2} s" }),
   msg({ message: "SUMO runs on maps of the catalogue, which have its network" }),

@@ -297,6 +297,12 @@ def _empty_scenario(
     """A scenario on the largest part of the map whose segments are connected."""
     graph = on_map.sumo_map.graph
     ids = graph.segments.ids
+    if not len(graph.lanes.x):
+        raise InputError(
+            "the network has no road: odscen has rails and waterways only beside roads, and plain "
+            "sumo -c runs it",
+            file=source.file.where,
+        )
     one, other = graph.segments.adjacency.T
     links = coo_array((np.ones(len(one)), (one, other)), shape=(len(ids), len(ids)))
     _, part = connected_components(links, directed=False)

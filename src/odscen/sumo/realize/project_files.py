@@ -125,7 +125,7 @@ def project_files(
     """
     names = _free_names(project.files, set(taken))
     texts: dict[str, str] = {}
-    reader = _UserReader(sumo_map, until)
+    reader = _UserReader(sumo_map, project.begin, until)
     roots = []
     for file, name in zip(project.files, names, strict=True):
         with in_file(file.name):
@@ -139,6 +139,7 @@ def project_files(
     for file, root in roots:
         with in_file(file.name):
             reader.read_users(root, file.name, sorted_only=file.kind == "routes")
+    reader.note_early()
     return ProjectFiles(
         tuple(n for n, f in zip(names, project.files, strict=True) if f.kind == "routes"),
         tuple(n for n, f in zip(names, project.files, strict=True) if f.kind == "additional"),
@@ -255,10 +256,12 @@ _FLOWS = ("flow", "personFlow")
 class _UserReader:
     """Reads vehicles, trips, flows and persons, as far as they are known before SUMO runs."""
 
-    def __init__(self, sumo_map: SumoMap, until: float) -> None:
+    def __init__(self, sumo_map: SumoMap, begin: float, until: float) -> None:
         self.notes: list[str] = []
         self._map = sumo_map
+        self._begin = begin
         self._until = until
+        self._early: list[str] = []
         self._types: dict[str, _Type] = {"DEFAULT_VEHTYPE": _CAR}
         self._routes: dict[str, tuple[str, ...]] = {}
         self._actors: list[PlannedActor] = []
@@ -311,6 +314,14 @@ class _UserReader:
             if depart is None:
                 depart = self._until  # triggered by another: not due at any known time
             self._add_user(name, depart, edges, kind, flow=None, appears=element.get("depart"))
+
+    def note_early(self) -> None:
+        """Note who is left out as SUMO leaves them out, because the simulation begins later."""
+        if self._early:
+            self.notes.append(
+                f"SUMO leaves out {len(self._early)} that depart before it begins at "
+                f"{self._begin:g} s, {self._early[0]!r} the first"
+            )
 
     def _taken_users(
         self, root: etree._Element, file: str, *, sorted_only: bool
@@ -381,11 +392,15 @@ class _UserReader:
                 "place, but not in the list of road users"
             )
             return
+        early = 0
         for index in range(MOST_LISTED):
             depart = begin + index * period
             if depart >= last - 1e-9 or (number is not None and index >= number):
                 break
-            self._add_user(f"{name}.{index}", depart, edges, kind, flow=name)
+            if depart < self._begin:
+                early += 1  # SUMO numbers the others from 0 on
+                continue
+            self._add_user(f"{name}.{index - early}", depart, edges, kind, flow=name)
 
     def _add_user(
         self,
@@ -397,6 +412,9 @@ class _UserReader:
         flow: str | None,
         appears: str | None = None,
     ) -> None:
+        if depart < self._begin:
+            self._early.append(name)  # SUMO leaves out who is due before it begins
+            return
         if depart > self._until or name in self._seen:
             return
         self._seen.add(name)
