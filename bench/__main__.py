@@ -41,6 +41,7 @@ ALL = (
     "server_load",
     "sizes",
     "carla_mirror",
+    "foreign_poses",
     "canvas",
     "in_browser",
     "editing",

@@ -7,6 +7,7 @@ is an event.
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -31,10 +32,12 @@ PREFIX = "carla:"
 _PEDESTRIAN = "pedestrian"
 _FAST = 200.0
 """m/s; no limit of a model, for one whose speed is set."""
-_OFF_ROUTE = 6
-"""``keepRoute`` of persons that drivers see: exactly there, off their route as well."""
-_NEAR = 10.0
-"""Metres around a place in which SUMO looks for its lane."""
+_DRIVER = "passenger"
+"""Class whose lanes are those on which drivers brake for who is on foot."""
+_BY_THE_END = 0.01
+"""Metres to an end of a lane, over which somebody may be."""
+_FARTHEST = 1e7
+"""Metres, and more than any angle or speed: nobody is farther from a map."""
 _GOING = ("G", "g", "y", "Y")
 """Letters of links that vehicles may be on."""
 _DEVICES = ("fcd", "tripinfo", "ssm", "emissions", "rerouting", "friction", "stationfinder")
@@ -61,37 +64,52 @@ class ForeignTraffic:
         self._sumo = sumo
         self._errors = errors
         self._place = place
-        self._known: dict[str, bool] = {}
+        self._known: set[str] = set()
 
     def __len__(self) -> int:
         """How many there are."""
         return len(self._known)
 
     def show(self, users: Iterable[ForeignUser]) -> None:
-        """Put all of them where they are; those that are not named any more are taken out.
+        """Put those where they are whose front is on a lane, and take all others out.
 
-        A person can only be where people may walk on the nearest edge; others are left out.
+        SUMO's drivers see nobody elsewhere, and SUMO ends in a fault where one is placed off the
+        road at first, or comes off it at some places, or is at a number that is none. Who is on
+        foot is a short vehicle: SUMO ends in a fault, too, where its own persons are moved from a
+        crossing, and so drivers see them inside junctions as well.
         """
-        named = {PREFIX + user.id: user for user in users}
+        named = {PREFIX + user.id: user for user in users if self._is_on_a_lane(user)}
         for name in [name for name in self._known if name not in named]:
             self._take_out(name)
         for name, user in named.items():
-            if name in self._known and self._move_user(name, user, again=True):
+            at = EgoPose(user.x, user.y, user.angle_deg, user.speed)
+            if name in self._known and self._place(name, at, again=True):
                 continue
             self._take_out(name)
             if self._add_user(name, user):
-                self._known[name] = user.kind == _PEDESTRIAN
-                self._move_user(name, user)
+                self._known.add(name)
+                self._place(name, at)
+
+    def _is_on_a_lane(self, user: ForeignUser) -> bool:
+        """Whether the middle of a front is on a lane of its class, drivers' lanes if on foot."""
+        if not _has_a_place(user):
+            return False
+        simulation, lanes = self._sumo.simulation, self._sumo.lane
+        kind = _DRIVER if user.kind == _PEDESTRIAN else user.kind
+        try:
+            edge, pos, index = simulation.convertRoad(user.x, user.y, False, kind)
+            x, y = simulation.convert2D(edge, pos, index)
+        except self._errors:  # no lane is near
+            return False
+        lane = f"{edge}_{index}"
+        if not _BY_THE_END <= pos <= lanes.getLength(lane) - _BY_THE_END:
+            return False
+        width: float = lanes.getWidth(lane)
+        return math.dist((user.x, user.y), (x, y)) <= width / 2.0
 
     def _add_user(self, name: str, user: ForeignUser) -> bool:
-        sumo, kind = self._sumo, self._type_for(user)
         try:
-            if user.kind == _PEDESTRIAN:
-                edge, pos, _ = sumo.simulation.convertRoad(user.x, user.y, False, _PEDESTRIAN)
-                sumo.person.add(name, edge, pos, typeID=kind)
-                sumo.person.appendWalkingStage(name, [edge], pos)
-            else:
-                sumo.vehicle.add(name, "", kind)
+            self._sumo.vehicle.add(name, "", self._type_for(user))
         except self._errors:
             return False
         return True
@@ -101,9 +119,8 @@ class ForeignTraffic:
         types = self._sumo.vehicletype
         name = f"{PREFIX}{user.kind} {user.length:.2f} {user.width:.2f}"
         if name not in types.getIDList():
-            on_foot = user.kind == _PEDESTRIAN
-            types.copy("DEFAULT_PEDTYPE" if on_foot else "DEFAULT_VEHTYPE", name)
-            types.setVehicleClass(name, user.kind)
+            types.copy("DEFAULT_VEHTYPE", name)
+            types.setVehicleClass(name, _DRIVER if user.kind == _PEDESTRIAN else user.kind)
             types.setLength(name, user.length)
             types.setWidth(name, user.width)
             types.setMaxSpeed(name, _FAST)
@@ -111,25 +128,17 @@ class ForeignTraffic:
                 types.setParameter(name, f"has.{device}.device", "false")
         return name
 
-    def _move_user(self, name: str, user: ForeignUser, *, again: bool = False) -> bool:
-        if not self._known[name]:
-            at = EgoPose(user.x, user.y, user.angle_deg, user.speed)
-            return self._place(name, at, again=again)
-        try:
-            self._sumo.person.moveToXY(name, "", user.x, user.y, user.angle_deg, _OFF_ROUTE, _NEAR)
-        except self._errors:
-            return False
-        return True
-
     def _take_out(self, name: str) -> None:
-        person = self._known.pop(name, None)
-        if person is None:
-            return
-        with suppress(*self._errors):
-            if person:
-                self._sumo.person.removeStages(name)
-            else:
+        if name in self._known:
+            self._known.remove(name)
+            with suppress(*self._errors):
                 self._sumo.vehicle.remove(name, self._sumo.REMOVE_VAPORIZED)
+
+
+def _has_a_place(user: ForeignUser) -> bool:
+    """Whether all that is said of one are numbers, and the place is one of this world."""
+    values = (user.x, user.y, user.angle_deg, user.speed)
+    return all(math.isfinite(value) and abs(value) <= _FARTHEST for value in values)
 
 
 class _Links(NamedTuple):
