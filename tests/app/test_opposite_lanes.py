@@ -130,3 +130,24 @@ def test_the_cut_ins_of_esmini_from_the_opposite_lane_happen(
     assert y[time < begin] == pytest.approx(lane + 3.1, abs=0.05)
     assert y[time > end] == pytest.approx(lane, abs=0.05)
     assert np.all(np.diff(x) > 0.0)
+
+
+def test_one_that_comes_against_a_lane_from_a_place_of_parameters_stays_in_it(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    text = FILE.replace("ACTION", SPEED)
+    start = '<LanePosition roadId="0" laneId="-1" s="${$kph + 150}"><Orientation type="relative"'
+    start += ' h="3.14159265"/></LanePosition>'
+    text = re.sub(r"<RelativeLanePosition .*?/>", start, text)
+    text = text.replace("</Private></Actions>", f"{AT_20}</Private></Actions>")
+    (tmp_path / "road.xodr").write_text(TWO_WAY)
+    (tmp_path / "against.xosc").write_text(text)
+    found = import_file(workspace, tmp_path / "against.xosc")
+    settings = RunSettings(until=2.0)
+    done = run(workspace, found.scenario, settings=settings, name="run", out=tmp_path)
+    rows = done.trajectories().sort("time")
+    other = rows.filter(rows["id"] == "Other", rows["time"].is_between(0.3, 1.5))
+    assert other["y"].to_numpy() == pytest.approx(-1.75, abs=0.01)
+    assert np.cos(other["hdg"].to_numpy()) == pytest.approx(-1.0, abs=1e-6)
+    passed = np.diff(other["time"].to_numpy())
+    assert np.diff(other["x"].to_numpy()) / passed == pytest.approx(-20.0, abs=0.05)

@@ -236,7 +236,9 @@ class ActorPlaces:
             made["lateral_offset"] = 0.0
             then = [{"offset": {"to": round(left, 3), "over": 0.1}}, *then]
         if isinstance(centre.x, TracedNumber) or isinstance(centre.y, TracedNumber):
-            then = [{"appear": {"at": [centre.x, centre.y, hdg], "speed": speed}}, *then]
+            # On its lane: its offset counts from there, and not from the lane that it is to be on.
+            x, y = centre.x + left * math.sin(hdg), centre.y - left * math.cos(hdg)
+            then = [{"appear": {"at": [x, y, hdg], "speed": speed}}, *then]
         return then
 
     def vehicle(self, entity: ReadEntity, centre: MapPoint) -> dict[str, Any]:
