@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from odscen.sumo.worker.protocol import ForeignUser
+    from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
 
 class PlaceVehicle(Protocol):
@@ -58,12 +59,21 @@ class ForeignTraffic:
         libsumo, and what it raises.
     place
         Puts a vehicle somewhere, as :meth:`odscen.sumo.worker.simulation.session.Session.place`.
+    lanes
+        Those of the network.
     """
 
-    def __init__(self, sumo: Any, errors: tuple[type[Exception], ...], place: PlaceVehicle) -> None:
+    def __init__(
+        self,
+        sumo: Any,
+        errors: tuple[type[Exception], ...],
+        place: PlaceVehicle,
+        lanes: RoadLanes,
+    ) -> None:
         self._sumo = sumo
         self._errors = errors
         self._place = place
+        self._lanes = lanes
         self._known: set[str] = set()
 
     def __len__(self) -> int:
@@ -101,7 +111,7 @@ class ForeignTraffic:
             x, y = simulation.convert2D(edge, pos, index)
         except self._errors:  # no lane is near
             return False
-        lane = f"{edge}_{index}"
+        lane = self._lanes.in_order(edge)[index]
         if not _BY_THE_END <= pos <= lanes.getLength(lane) - _BY_THE_END:
             return False
         width: float = lanes.getWidth(lane)

@@ -115,7 +115,7 @@ class Session:
     def foreign_traffic(self) -> ForeignTraffic:
         """Road users that other programs drive."""
         if self._foreign is None:
-            self._foreign = ForeignTraffic(self._sumo, self._errors, self.place)
+            self._foreign = ForeignTraffic(self._sumo, self._errors, self.place, self.lanes)
         return self._foreign
 
     @cached_property
