@@ -121,7 +121,7 @@ def test_a_study_of_a_changed_light_and_a_closure_goes_from_drop_to_intervals_by
             options.nth(row).click()
     page.keyboard.press("Escape")
     page.get_by_role("button", name=re.compile(r"^Start \d+ runs$")).click()
-    expect(page.get_by_role("status").first).to_contain_text("all runs completed.", timeout=180_000)
+    expect(page.get_by_role("status").first).to_contain_text("all runs completed.", timeout=420_000)
     means = page.get_by_role("table", name="Means")
     for name in (before, after):
         expect(means.get_by_role("row").filter(has_text=name)).to_contain_text("±")
