@@ -93,6 +93,18 @@ def test_a_map_tells_its_lights_as_the_live_view_names_them(client: TestClient) 
     assert [name for names in light["signals"] for name in names]
 
 
+def test_heights_are_those_of_the_nodes_and_none_of_a_flat_map(
+    client: TestClient, workspace: Workspace
+) -> None:
+    assert client.get(f"/api/maps/{CROSSING}/heights").json() == {"z": [], "walks": []}
+    workspace.add_map(SHIPPED / "rural_hills.xodr")
+    columns = client.get("/api/maps/rural_hills/heights").json()
+    graph = workspace.map("rural_hills").graph()
+    assert np.ptp(graph.lanes.z) > 5
+    assert np.allclose(columns["z"], graph.lanes.z, atol=1e-3)
+    assert np.allclose(columns["walks"], graph.walks.z, atol=1e-3)
+
+
 def test_graph_columns_are_the_graph(client: TestClient, workspace: Workspace) -> None:
     answer = client.get(f"/api/maps/{CROSSING}/graph")
     columns, graph = answer.json(), workspace.map(CROSSING).graph()

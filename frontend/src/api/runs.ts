@@ -1,5 +1,6 @@
 import { address, call } from "./client";
 import type { components } from "./schema";
+import type { ScenarioDocument } from "./types";
 
 type Schemas = components["schemas"];
 
@@ -44,6 +45,12 @@ export const runs = {
   files: (run: string) => call("get", "/api/runs/{run}/files", { params: { path: { run } } }),
   fileUrl: (run: string, name: string) =>
     address("/api/runs/{run}/files/{name}", { params: { path: { run, name } } }),
+  /** The scenario as it was run. */
+  scenario: async (run: string): Promise<Pick<ScenarioDocument, "environment">> => {
+    const answer = await fetch(runs.fileUrl(run, "scenario.json"));
+    if (!answer.ok) throw new Error(answer.statusText);
+    return (await answer.json()) as ScenarioDocument;
+  },
   info: (run: string) => call("get", "/api/runs/{run}", { params: { path: { run } } }),
   control: (run: string, action: Action, speed?: number | null) =>
     call("post", "/api/runs/{run}/control", {

@@ -63,6 +63,13 @@ export interface paths {
          */
         get: operations["graph_api_maps__name__graph_get"];
     };
+    "/api/maps/{name}/heights": {
+        /**
+         * Heights
+         * @description Heights of the nodes of a map's graphs; none where all have the same.
+         */
+        get: operations["heights_api_maps__name__heights_get"];
+    };
     "/api/maps/{name}/report": {
         /**
          * Report
@@ -2402,6 +2409,15 @@ export interface components {
         Health: {
             version: string;
             workspace: string;
+        };
+        /**
+         * @description Heights of the nodes of both graphs in their order, metres; none where all have the same.
+         *
+         *     ``z`` is of the lane graph, ``walks`` of the pedestrian graph.
+         */
+        HeightColumns: {
+            z: number[];
+            walks: number[];
         };
         /** @description Sound the horn. */
         Honking: Record<string, never>;
@@ -6060,6 +6076,25 @@ export interface operations {
             200: {
                 content: {
                     "application/json": components["schemas"]["GraphColumns"];
+                };
+            };
+            /** @description What the client has is right. */
+            304: {
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    heights_api_maps__name__heights_get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["HeightColumns"];
                 };
             };
             /** @description What the client has is right. */

@@ -23,6 +23,7 @@ export type NetworkOrigin = Schemas["NetworkOrigin"];
 export type Converter = Exclude<NetworkOrigin["converter"], "file"> | null;
 export type MapDetails = Schemas["MapDetails"];
 export type GraphColumns = Schemas["GraphColumns"];
+export type HeightColumns = Schemas["HeightColumns"];
 export type WalkColumns = Schemas["WalkColumns"];
 export type PackedLines = Schemas["PackedLines"];
 export type PackedDrawing = Schemas["DrawingColumns"];

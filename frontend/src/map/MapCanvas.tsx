@@ -72,6 +72,8 @@ interface Props {
   /** Whether a click chooses something, so that the pointer is a cross. */
   aim?: boolean;
   handle?: RefObject<MapHandle | null>;
+  /** What lies over the map and shows the same road users and lights, while it is there. */
+  over?: RefObject<Pick<MapHandle, "setMoving" | "setHeads"> | null>;
   onPick?: (at: Pointed) => void;
   onPoint?: (at: Pointed | null) => void;
   /** Whether the drag that begins here takes something along instead of moving the map. */
@@ -104,6 +106,7 @@ export function MapCanvas({
   label,
   aim = false,
   handle,
+  over,
   onPick,
   onPoint,
   onGrab,
@@ -210,8 +213,9 @@ export function MapCanvas({
   useImperativeHandle(
     handle,
     () => ({
-      setMoving: (moving) => renderer.current?.setMoving(moving),
-      setHeads: (heads) => renderer.current?.setHeads(heads),
+      // What is hidden is not drawn.
+      setMoving: (moving) => (over?.current ?? renderer.current)?.setMoving(moving),
+      setHeads: (heads) => (over?.current ?? renderer.current)?.setHeads(heads),
       setMarks: (marks) => renderer.current?.setMarks(marks),
       show: (bounds) => apply(fit(bounds, size.current, 0.15)),
       centre: (x, y, aside = 0) => {
@@ -236,7 +240,7 @@ export function MapCanvas({
           shift: false,
         }),
     }),
-    [apply, pick],
+    [apply, pick, over],
   );
 
   // React's wheel listener is passive; the page must not scroll along.

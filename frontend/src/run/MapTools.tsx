@@ -12,6 +12,7 @@ export function MapTools({
   lights,
   onBy,
   share,
+  look,
   views,
   children,
 }: {
@@ -23,6 +24,8 @@ export function MapTools({
   onBy: (by: ColourBy) => void;
   /** What the picture is taken away with. */
   share?: ReactNode;
+  /** What chooses between plan and three dimensions. */
+  look?: ReactNode;
   /** What adds a view, or closes this one. */
   views?: ReactNode;
   children?: ReactNode;
@@ -51,6 +54,7 @@ export function MapTools({
             if (next) onBy(next as ColourBy);
           }}
         />
+        {look}
         {share}
         {views}
       </div>

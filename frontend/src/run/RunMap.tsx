@@ -1,5 +1,6 @@
 import { t } from "@lingui/core/macro";
-import { useEffect, useMemo, useRef } from "react";
+import { Loader } from "@mantine/core";
+import { Suspense, useEffect, useMemo, useRef, useState } from "react";
 
 import type { RunInfo } from "../api/runs";
 import type { Bounds, Category } from "../api/types";
@@ -8,7 +9,9 @@ import type { PackedDrawing } from "../map/drawing";
 import type { LoadedGraph } from "../map/loaded";
 import type { Mark, MarkKind, Scene } from "../map/scene";
 import type { Head } from "../signals/heads";
+import type { SceneryHandle } from "../scenery/SceneryView";
 import type { KeptPlace } from "../ui/kept";
+import { tell } from "../ui/notices";
 import type { Crowd } from "./frames";
 import { LaneTools } from "./LaneTools";
 import { QUANTITIES } from "./laneUse";
@@ -19,13 +22,16 @@ import { RunHint } from "./RunHint";
 import { ShareMenu } from "./ShareMenu";
 import { SpeedChart } from "./SpeedChart";
 import { type LaneData, useLaneUse } from "./useLaneUse";
+import { SceneryView, useScenery } from "./useScenery";
 import type { Picture } from "./usePicture";
 import type { Player } from "./useReplay";
 import type { ViewsOfRun } from "./useViews";
+import { LookChoice } from "./LookChoice";
 import { ViewButtons, viewName } from "./ViewButtons";
 import { MOST_VIEWS, type RunSight } from "./views";
 
 interface Props {
+  scenario: string;
   run: string;
   /** Null in all views but the first, which alone says how the preparation goes. */
   info: RunInfo | null;
@@ -64,6 +70,7 @@ interface Props {
 
 /** One view of a run from above, with what lies on its map. */
 export function RunMap({
+  scenario,
   run,
   info,
   lost,
@@ -89,7 +96,7 @@ export function RunMap({
   kinds,
   onPick,
 }: Props) {
-  const { id, followed, by, begin } = sight;
+  const { id, followed, by, begin, camera } = sight;
   const { list, handleOf, moved, focus } = views;
   const { redraw, now } = picture;
   const { replay } = player;
@@ -122,9 +129,17 @@ export function RunMap({
     [replay, followed, limits],
   );
   const speeds = recorded ?? (followed ? picture.speedsOf(followed) : []);
+  const scenery = useRef<SceneryHandle | null>(null);
+  const parts = useScenery(camera !== null, map ?? null, run, scenario);
+  // Anew each time that it is there, or gone.
+  const [shows, setShows] = useState(0);
+  const inSpace = camera !== null && parts !== null && loaded !== null;
+  useEffect(() => {
+    if (!inSpace) setShows((old) => old + 1);
+  }, [inSpace]);
   // What has come before the map is drawn with it, so that nothing is missing or flickers.
-  useEffect(() => redraw(), [redraw, drawing, loaded]);
-  useEffect(() => handle.current?.setHeads(heads), [handle, heads, drawing, loaded]);
+  useEffect(() => redraw(), [redraw, drawing, loaded, shows]);
+  useEffect(() => handle.current?.setHeads(heads), [handle, heads, drawing, loaded, shows]);
   useEffect(() => handle.current?.setMarks(marks), [handle, marks, drawing, loaded]);
   const use = (): void => views.use(id);
   return (
@@ -143,6 +158,7 @@ export function RunMap({
         picker={loaded?.picker ?? null}
         scene={coloured}
         handle={handle}
+        over={scenery}
         label={name === null ? what : `${what}, ${name}`}
         place={place}
         onPick={(at) => {
@@ -153,6 +169,34 @@ export function RunMap({
           if (at && laneUse.by) laneUse.point(at);
         }}
       >
+        {inSpace && (
+          <div
+            className="run-scenery"
+            // The map below is not meant.
+            onPointerDown={(event) => event.stopPropagation()}
+            onPointerMove={(event) => event.stopPropagation()}
+            onPointerUp={(event) => event.stopPropagation()}
+          >
+            <Suspense fallback={<Loader aria-label={t`Loading the view in 3D`} />}>
+              <SceneryView
+                drawing={drawing}
+                graph={loaded.graph}
+                heights={parts.heights}
+                weather={parts.weather}
+                camera={camera}
+                from={() => handle.current?.view() ?? null}
+                label={`${name === null ? what : `${what}, ${name}`}, 3D`}
+                handle={scenery}
+                onPick={onPick}
+                onFail={() => {
+                  tell(t`This browser cannot show three dimensions; here is the plan.`);
+                  views.look(id, null);
+                }}
+                onReady={() => setShows((old) => old + 1)}
+              />
+            </Suspense>
+          </div>
+        )}
         <RunHint
           info={info}
           lost={lost}
@@ -177,9 +221,22 @@ export function RunMap({
           share={
             <ShareMenu
               run={run}
-              handle={handle}
+              handle={inSpace ? scenery : handle}
+              vector={inSpace ? null : () => handle.current?.vector() ?? null}
               playing={live ? null : player.playing}
               onPlay={player.play}
+            />
+          }
+          look={
+            <LookChoice
+              camera={camera}
+              onLook={(next) => {
+                // Who is looked after is the ego, unless another one is.
+                const [ego] = crowd?.egos() ?? [];
+                const one = ego ?? crowd?.all().find(({ category }) => category === "car")?.id;
+                if (next && next !== "above" && followed === null && one) views.follow(id, one);
+                views.look(id, next);
+              }}
             />
           }
           views={

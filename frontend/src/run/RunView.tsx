@@ -204,6 +204,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
               {sights.map((sight, n) => (
                 <RunMap
                   key={sight.id}
+                  scenario={scenario}
                   run={run}
                   info={n === 0 ? info : null}
                   lost={lost && n === 0}

@@ -13,11 +13,14 @@ import { IconDown } from "../ui/icons";
 export function ShareMenu({
   run,
   handle,
+  vector,
   playing,
   onPlay,
 }: {
   run: string;
-  handle: RefObject<MapHandle | null>;
+  handle: RefObject<Pick<MapHandle, "picture"> | null>;
+  /** Of the plan, which alone can be written as a drawing; null in three dimensions. */
+  vector: (() => string | null) | null;
   /** Whether the picture moves; null of a live run. */
   playing: boolean | null;
   /** Plays the recording of the run. */
@@ -93,14 +96,16 @@ export function ShareMenu({
         <Menu.Item onClick={() => print()}>
           <Trans>Print</Trans>
         </Menu.Item>
-        <Menu.Item
-          onClick={() => {
-            const svg = handle.current?.vector();
-            if (svg) saveVector(svg, run);
-          }}
-        >
-          <Trans>Drawing of the map (SVG)</Trans>
-        </Menu.Item>
+        {vector && (
+          <Menu.Item
+            onClick={() => {
+              const svg = vector();
+              if (svg) saveVector(svg, run);
+            }}
+          >
+            <Trans>Drawing of the map (SVG)</Trans>
+          </Menu.Item>
+        )}
       </Menu.Dropdown>
     </Menu>
   );

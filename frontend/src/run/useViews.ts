@@ -4,6 +4,7 @@ import type { MapHandle } from "../map/MapCanvas";
 import type { View } from "../map/view";
 import { keep, type Kept } from "../ui/kept";
 import type { LaneSight } from "./laneUse";
+import type { Camera } from "../scenery/cameras";
 import type { ColourBy } from "./tint";
 import { added, changed, closed, keptOf, openedViews, type RunSight, type RunViews } from "./views";
 
@@ -19,6 +20,8 @@ export interface ViewsOfRun {
   follow: (id: number, user: string | null) => void;
   colour: (id: number, by: ColourBy) => void;
   colourLanes: (id: number, lanes: LaneSight | null) => void;
+  /** Looks at it in three dimensions, or as a plan again. */
+  look: (id: number, camera: Camera | null) => void;
   /** Takes in what part of the map a view shows. */
   moved: (id: number, at: View) => void;
   /** The view that is to have the focus, as the one that had it was opened or closed; new at each time. */
@@ -67,6 +70,10 @@ export function useViews(linked: Kept): ViewsOfRun {
     (id: number, lanes: LaneSight | null) => setViews((old) => changed(old, id, { lanes })),
     [],
   );
+  const look = useCallback(
+    (id: number, camera: Camera | null) => setViews((old) => changed(old, id, { camera })),
+    [],
+  );
   const moved = useCallback((id: number, at: View) => {
     // A map that is taken away may still report a frame later.
     if (!newest.current.list.some((one) => one.id === id)) return;
@@ -77,7 +84,7 @@ export function useViews(linked: Kept): ViewsOfRun {
   const used = list.find(({ id }) => id === views.used) ?? list[0];
   if (!used) throw new Error("a run has no view");
   return useMemo(
-    () => ({ list, used, handleOf, use, add, close, follow, colour, colourLanes, moved, focus }),
-    [list, used, handleOf, use, add, close, follow, colour, colourLanes, moved, focus],
+    () => ({ list, used, handleOf, use, add, close, follow, colour, colourLanes, look, moved, focus }),
+    [list, used, handleOf, use, add, close, follow, colour, colourLanes, look, moved, focus],
   );
 }

@@ -1,4 +1,5 @@
 import type { View } from "../map/view";
+import { type Camera, isCamera } from "../scenery/cameras";
 import type { Kept } from "../ui/kept";
 import { laneSight, type LaneSight, laneSightText } from "./laneUse";
 import { type ColourBy, isColourBy } from "./tint";
@@ -13,6 +14,8 @@ export interface RunSight {
   by: ColourBy;
   /** What the colours of lanes say, once the run has ended; null for nothing. */
   lanes: LaneSight | null;
+  /** From where it is looked at in three dimensions; null for the plan. */
+  camera: Camera | null;
   /** Where it was opened; null for where the scenario takes place. */
   begin: View | null;
 }
@@ -27,14 +30,15 @@ export interface RunViews {
 export const MOST_VIEWS = 2;
 
 /** The views that a link asks for. */
-export function openedViews({ at, chosen, by, lanes, others = [] }: Kept): RunViews {
-  const all = [{ at, followed: chosen?.[0], by, lanes }, ...others].slice(0, MOST_VIEWS);
+export function openedViews({ at, chosen, by, lanes, camera, others = [] }: Kept): RunViews {
+  const all = [{ at, followed: chosen?.[0], by, lanes, camera }, ...others].slice(0, MOST_VIEWS);
   return {
     list: all.map((one, id) => ({
       id,
       followed: one.followed ?? null,
       by: isColourBy(one.by) ? one.by : "kind",
       lanes: laneSight(one.lanes),
+      camera: isCamera(one.camera) ? one.camera : null,
       begin: one.at ?? null,
     })),
     used: 0,
@@ -43,13 +47,14 @@ export function openedViews({ at, chosen, by, lanes, others = [] }: Kept): RunVi
 
 /** What a link keeps of views; `places` has by id where they are now. */
 export function keptOf({ list }: RunViews, places: ReadonlyMap<number, View>): Kept {
-  const [first, ...others] = list.map(({ id, followed, by, lanes, begin }) => {
+  const [first, ...others] = list.map(({ id, followed, by, lanes, camera, begin }) => {
     const at = places.get(id) ?? begin;
     return {
       ...(at && { at }),
       ...(followed && { followed }),
       ...(by !== "kind" && { by }),
       ...(lanes && { lanes: laneSightText(lanes) }),
+      ...(camera && { camera }),
     };
   });
   // What is not there takes away what the address has, but for a place that is not known yet.
@@ -58,6 +63,7 @@ export function keptOf({ list }: RunViews, places: ReadonlyMap<number, View>): K
     chosen: first?.followed ? [first.followed] : [],
     by: first?.by,
     lanes: first?.lanes,
+    camera: first?.camera,
     others,
   };
 }
@@ -69,7 +75,9 @@ export function added(views: RunViews, after: number, at: View | null): RunViews
   const model = list[index];
   if (!model || list.length >= MOST_VIEWS) return views;
   const id = Math.max(...list.map((one) => one.id)) + 1;
-  const made = { ...model, id, followed: null, begin: at ?? model.begin };
+  // Without a road user there is no seat to look from.
+  const camera = model.camera === "above" ? model.camera : null;
+  const made = { ...model, id, followed: null, camera, begin: at ?? model.begin };
   return { list: list.toSpliced(index + 1, 0, made), used: id };
 }
 
@@ -85,5 +93,5 @@ export function closed(views: RunViews, id: number): RunViews {
 export const changed = (
   { list, used }: RunViews,
   id: number,
-  part: Partial<Pick<RunSight, "followed" | "by" | "lanes">>,
+  part: Partial<Pick<RunSight, "followed" | "by" | "lanes" | "camera">>,
 ): RunViews => ({ list: list.map((one) => (one.id === id ? { ...one, ...part } : one)), used });

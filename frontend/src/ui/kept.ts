@@ -14,6 +14,8 @@ export interface Kept {
   by?: string;
   /** What those of lanes say, and of which part of a run. */
   lanes?: string;
+  /** From where it is looked at in three dimensions. */
+  camera?: string;
   /** Further views of the same, in their order; the first one is described above. */
   others?: readonly KeptView[];
 }
@@ -24,6 +26,7 @@ export interface KeptView {
   followed?: string;
   by?: string;
   lanes?: string;
+  camera?: string;
 }
 
 /** Milliseconds for which the address may lag behind. */
@@ -51,15 +54,20 @@ export function parseKept(hash: string): Kept {
   if (by) kept.by = by;
   const lanes = query.get("lanes");
   if (lanes) kept.lanes = lanes;
+  const camera = query.get("camera");
+  if (camera) kept.camera = camera;
   const others: KeptView[] = [];
   for (let n = 2; n < 2 + MOST_OTHERS && query.has(`at${n}`); n++) {
     const place = parsePlace(query.get(`at${n}`));
-    const [followed, colours, lanes] = ["chosen", "by", "lanes"].map((key) => query.get(`${key}${n}`));
+    const [followed, colours, lanes, camera] = ["chosen", "by", "lanes", "camera"].map((key) =>
+      query.get(`${key}${n}`),
+    );
     others.push({
       ...(place && { at: place }),
       ...(followed && { followed }),
       ...(colours && { by: colours }),
       ...(lanes && { lanes }),
+      ...(camera && { camera }),
     });
   }
   if (others.length > 0) kept.others = others;
@@ -77,7 +85,10 @@ const placeText = ({ x, y, scale }: View): string =>
   `${x.toFixed(2)},${y.toFixed(2)},${Number(scale.toPrecision(5))}`;
 
 /** Inverse of {@link parseKept}, put behind the path of an address. */
-export function withKept(hash: string, { at, step, chosen, time, by, lanes, others = [] }: Kept): string {
+export function withKept(
+  hash: string,
+  { at, step, chosen, time, by, lanes, camera, others = [] }: Kept,
+): string {
   const query = new URLSearchParams();
   if (at) query.set("at", placeText(at));
   if (step) query.set("step", step);
@@ -85,12 +96,14 @@ export function withKept(hash: string, { at, step, chosen, time, by, lanes, othe
   if (time !== undefined) query.set("time", time.toFixed(1));
   if (by) query.set("by", by);
   if (lanes) query.set("lanes", lanes);
+  if (camera) query.set("camera", camera);
   others.forEach((other, k) => {
     // Also without a place it is there.
     query.set(`at${k + 2}`, other.at ? placeText(other.at) : "");
     if (other.followed) query.set(`chosen${k + 2}`, other.followed);
     if (other.by) query.set(`by${k + 2}`, other.by);
     if (other.lanes) query.set(`lanes${k + 2}`, other.lanes);
+    if (other.camera) query.set(`camera${k + 2}`, other.camera);
   });
   const text = query.toString().replaceAll("%2C", ",");
   return text ? `${pathOf(hash)}?${text}` : pathOf(hash);

@@ -2,7 +2,6 @@
 import { screen } from "@testing-library/react";
 import { beforeEach, expect, test, vi } from "vitest";
 
-import type { MapHandle } from "../../src/map/MapCanvas";
 import { ShareMenu } from "../../src/run/ShareMenu";
 import { show } from "../page";
 
@@ -39,8 +38,8 @@ beforeEach(() => {
 
 const part = (playing: boolean | null, onPlay: () => void) => {
   const picture = (into?: HTMLCanvasElement): HTMLCanvasElement => into ?? document.createElement("canvas");
-  const handle = { current: { picture, vector: () => "<svg/>" } as MapHandle };
-  return <ShareMenu run="r1" handle={handle} playing={playing} onPlay={onPlay} />;
+  const handle = { current: { picture } };
+  return <ShareMenu run="r1" handle={handle} vector={() => "<svg/>"} playing={playing} onPlay={onPlay} />;
 };
 const item = async (user: ReturnType<typeof show>["user"], name: string): Promise<void> => {
   await user.click(screen.getByRole("button", { name: "Share" }));

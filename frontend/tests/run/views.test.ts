@@ -18,9 +18,11 @@ const PLACE = { x: 10, y: 20, scale: 4 };
 const FAR = { x: -3, y: 7.25, scale: 0.5 };
 
 test("a link without views opens one, at the place and with the road user that it names", () => {
-  expect(openedViews({}).list).toEqual([{ id: 0, followed: null, by: "kind", lanes: null, begin: null }]);
+  expect(openedViews({}).list).toEqual([
+    { id: 0, followed: null, by: "kind", lanes: null, camera: null, begin: null },
+  ]);
   expect(openedViews({ at: PLACE, chosen: ["car-1"], by: "delay", lanes: "flow" }).list).toEqual([
-    { id: 0, followed: "car-1", by: "delay", lanes: { by: "flow", span: null }, begin: PLACE },
+    { id: 0, followed: "car-1", by: "delay", lanes: { by: "flow", span: null }, camera: null, begin: PLACE },
   ]);
   // What is no colouring is the plain one, and there are never more views than fit.
   const many = openedViews({ by: "smell", others: [{}, {}, {}] });
@@ -32,7 +34,7 @@ test("a new view shows the same place in the same colours, follows nobody and is
   const two = added(one, 0, PLACE);
   expect(two.used).toBe(1);
   const lanes = { by: "delay", span: [1, 3] };
-  expect(two.list[1]).toEqual({ id: 1, followed: null, by: "speed", lanes, begin: PLACE });
+  expect(two.list[1]).toEqual({ id: 1, followed: null, by: "speed", lanes, camera: null, begin: PLACE });
   expect(added(two, 0, PLACE)).toBe(two);
 });
 
@@ -59,14 +61,23 @@ test("a link keeps how many views there are, what each shows and whom it follows
     followed: "bus, 2",
     by: "speed",
     lanes: { by: "density", span: [2, 5] },
+    camera: "seat",
   });
   const hash = withKept("#/run/s/r", keptOf(made, new Map([[0, FAR]])));
   expect(hash).toContain("at2=10.00,20.00,4&");
   const opened = openedViews(parseKept(hash));
   expect(opened.list).toEqual([
-    { id: 0, followed: "a & b", by: "kind", lanes: null, begin: FAR },
-    { id: 1, followed: "bus, 2", by: "speed", lanes: { by: "density", span: [2, 5] }, begin: PLACE },
+    { id: 0, followed: "a & b", by: "kind", lanes: null, camera: null, begin: FAR },
+    {
+      id: 1,
+      followed: "bus, 2",
+      by: "speed",
+      lanes: { by: "density", span: [2, 5] },
+      camera: "seat",
+      begin: PLACE,
+    },
   ]);
+  expect(openedViews(parseKept("#/run/s/r?camera=moon")).list[0]?.camera).toBeNull();
 });
 
 test("a view whose place is not known yet is in the link, too", () => {

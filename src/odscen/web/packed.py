@@ -51,6 +51,12 @@ def answer(request: Request, packed: PackedAnswer) -> Response:
     return Response(content, media_type="application/json", headers=headers)
 
 
+_FLAT = 0.005
+"""Metres between the highest and the lowest node of lanes of a map that is flat."""
+_KERB = 0.3
+"""Metres by which its walks may lie above these."""
+
+
 @lru_cache(maxsize=8)
 def packed_drawing(entry: MapEntry) -> PackedAnswer:
     """``drawing.json`` of a map."""
@@ -111,6 +117,18 @@ def graph_columns(entry: MapEntry) -> dict[str, Any]:
             "kind": walks.kind.astype(np.int32),
         },
     }
+
+
+@lru_cache(maxsize=8)
+def packed_heights(entry: MapEntry) -> PackedAnswer:
+    """Heights of the nodes of a map's graphs, which only a view in three dimensions needs."""
+    graph = load_map(entry).sumo.graph
+    lanes, walks = graph.lanes.z, graph.walks.z
+    flat = np.ptp(lanes) < _FLAT and (len(walks) == 0 or np.abs(walks - lanes[0]).max() < _KERB)
+    if flat:
+        lanes = walks = np.empty(0)
+    columns = {"z": np.round(lanes, 3), "walks": np.round(walks, 3)}
+    return pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY))
 
 
 def _pack_places(*columns: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:

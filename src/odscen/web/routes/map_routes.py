@@ -38,7 +38,7 @@ from odscen.web.messages import (
     OptionInfo,
     WeatherInfo,
 )
-from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph
+from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph, packed_heights
 from odscen.web.services import Shared
 from odscen.web.wire.map_messages import (
     BrokenMapInfo,
@@ -47,6 +47,7 @@ from odscen.web.wire.map_messages import (
     DrawingColumns,
     GraphColumns,
     GraphCounts,
+    HeightColumns,
     ImporterInfo,
     LightInfo,
     MapDetails,
@@ -123,6 +124,12 @@ def drawing(name: str, request: Request, shared: Shared) -> Response:
 def graph(name: str, request: Request, shared: Shared) -> Response:
     """Lane graph, segments and pedestrian graph as columns, see ``docs/server.md``."""
     return answer(request, packed_graph(shared.workspace.map(name)))
+
+
+@router.get("/maps/{name}/heights", response_model=HeightColumns, responses=UNCHANGED)
+def heights(name: str, request: Request, shared: Shared) -> Response:
+    """Heights of the nodes of a map's graphs; none where all have the same."""
+    return answer(request, packed_heights(shared.workspace.map(name)))
 
 
 @router.get("/maps/{name}/report")

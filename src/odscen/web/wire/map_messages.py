@@ -303,6 +303,16 @@ class GraphColumns(NodeColumns):
     walks: WalkColumns
 
 
+class HeightColumns(Answer):
+    """Heights of the nodes of both graphs in their order, metres; none where all have the same.
+
+    ``z`` is of the lane graph, ``walks`` of the pedestrian graph.
+    """
+
+    z: list[float]
+    walks: list[float]
+
+
 class PackedLines(Answer):
     """Lines or rings: how many points each has, and centimetres from each point to the next."""
 

@@ -1,0 +1,173 @@
+import {
+  AdditiveBlending,
+  type BufferGeometry,
+  Color,
+  Group,
+  InstancedMesh,
+  type Material,
+  Matrix4,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  Quaternion,
+  Vector3,
+} from "three";
+
+import { CATEGORIES } from "../api/types";
+import { nth } from "../lists";
+import { CATEGORY_COLOR } from "../map/colors";
+import { FLAG_BRAKE, FLAG_LEFT, FLAG_RIGHT } from "../map/movingLayer";
+import type { Moving } from "../map/scene";
+import { body, brakeLamps, HEIGHT, headLamps, indicators, lightPool } from "./bodies";
+import type { Carried } from "./cameras";
+import type { Origin } from "./ground";
+import type { Heights } from "./heights";
+
+const [UP, ACROSS] = [new Vector3(0, 0, 1), new Vector3(0, 1, 0)];
+const RIDDEN = new Set(["bicycle", "pedestrian"]);
+
+/** Many bodies of one shape, as many as there are at the moment. */
+class Bodies {
+  private mesh: InstancedMesh | null = null;
+  private rows = 0;
+
+  constructor(
+    private readonly group: Group,
+    private readonly shape: BufferGeometry,
+    private readonly look: Material,
+  ) {}
+
+  begin(most: number): void {
+    this.rows = 0;
+    if (this.mesh && this.mesh.instanceMatrix.count >= most) return;
+    if (most === 0) return;
+    this.mesh?.removeFromParent();
+    this.mesh?.dispose();
+    this.mesh = new InstancedMesh(this.shape, this.look, Math.ceil(most * 1.5) + 8);
+    this.mesh.frustumCulled = false; // bounds of instances are not those of the shape
+    this.group.add(this.mesh);
+  }
+
+  add(at: Matrix4, color?: Color): void {
+    this.mesh?.setMatrixAt(this.rows, at);
+    if (color) this.mesh?.setColorAt(this.rows, color);
+    this.rows += 1;
+  }
+
+  end(): void {
+    if (!this.mesh) return;
+    this.mesh.count = this.rows;
+    this.mesh.instanceMatrix.needsUpdate = true;
+    if (this.mesh.instanceColor) this.mesh.instanceColor.needsUpdate = true;
+  }
+}
+
+/** All road users of a moment, as bodies with lamps. */
+export class CrowdOfBodies {
+  readonly group = new Group();
+  /** Whether lamps are on. */
+  dark = false;
+  private readonly bodies: readonly Bodies[];
+  private readonly lamps: Record<"brake" | "left" | "right" | "front" | "pool", Bodies>;
+  private readonly colors = new Map<string, Color>();
+
+  constructor(
+    private readonly origin: Origin,
+    private readonly heights: Heights,
+  ) {
+    const painted = new MeshLambertMaterial({ vertexColors: true });
+    const glowing = (color: number): MeshBasicMaterial => new MeshBasicMaterial({ color });
+    this.bodies = CATEGORIES.map((category) => new Bodies(this.group, body(category), painted));
+    const mirrored = indicators().scale(1, -1, 1);
+    mirrored.setIndex([...Array(mirrored.getAttribute("position").count).keys()].reverse());
+    this.lamps = {
+      brake: new Bodies(this.group, brakeLamps(), glowing(0xff2a1f)),
+      left: new Bodies(this.group, indicators(), glowing(0xffa21a)),
+      right: new Bodies(this.group, mirrored, glowing(0xffa21a)),
+      front: new Bodies(this.group, headLamps(), glowing(0xfff6dd)),
+      pool: new Bodies(
+        this.group,
+        lightPool(),
+        new MeshBasicMaterial({
+          vertexColors: true,
+          blending: AdditiveBlending,
+          transparent: true,
+          opacity: 0.35,
+          depthWrite: false,
+        }),
+      ),
+    };
+  }
+
+  /** Places all of a moment; `hidden` is the row of who looks out of its own eyes, or -1. */
+  show(moving: Moving, hidden: number): void {
+    const all = [...this.bodies, ...Object.values(this.lamps)];
+    for (const one of all) one.begin(moving.count);
+    const { group, colors } = moving.tint ?? { group: moving.category, colors: KIND_COLORS };
+    const at = new Matrix4();
+    for (let row = 0; row < moving.count; row++) {
+      if (row === hidden) continue;
+      const who = this.carried(moving, row);
+      nth(this.bodies, nth(moving.category, row)).add(
+        placed(at, who, who.length, who.width, HEIGHT[who.category]),
+        this.color(nth(colors, nth(group, row))),
+      );
+      if (!RIDDEN.has(who.category)) this.addLamps(at, who, nth(moving.flags, row));
+    }
+    for (const one of all) one.end();
+  }
+
+  /** A road user of a moment with its height and slope, in metres of the scene. */
+  carried({ pose, category }: Moving, row: number): Carried {
+    const [x, y, hdg, length, width] = [0, 1, 2, 3, 4].map((k) => nth(pose, 5 * row + k)) as [
+      number,
+      number,
+      number,
+      number,
+      number,
+    ];
+    const { z, east, north } = this.heights.plane(x, y, { hdg });
+    return {
+      x: x - this.origin[0],
+      y: y - this.origin[1],
+      z,
+      hdg,
+      slope: east * Math.cos(hdg) + north * Math.sin(hdg),
+      length,
+      width,
+      category: nth(CATEGORIES, nth(category, row)),
+    };
+  }
+
+  private addLamps(at: Matrix4, who: Carried, flags: number): void {
+    // `at` is where the body is still.
+    if (flags & FLAG_BRAKE) this.lamps.brake.add(at);
+    if (flags & FLAG_LEFT) this.lamps.left.add(at);
+    if (flags & FLAG_RIGHT) this.lamps.right.add(at);
+    if (!this.dark) return;
+    this.lamps.front.add(at);
+    const [cos, sin] = [Math.cos(who.hdg), Math.sin(who.hdg)];
+    const nose = { ...who, x: who.x + (who.length / 2) * cos, y: who.y + (who.length / 2) * sin };
+    nose.z += (who.length / 2) * who.slope;
+    this.lamps.pool.add(placed(at, nose, 1, 1, 1));
+  }
+
+  private color(text: string): Color {
+    const found = this.colors.get(text) ?? new Color(text);
+    this.colors.set(text, found);
+    return found;
+  }
+}
+
+const KIND_COLORS = CATEGORIES.map((category) => CATEGORY_COLOR[category]);
+
+function placed(
+  at: Matrix4,
+  { x, y, z, hdg, slope }: Carried,
+  length: number,
+  width: number,
+  height: number,
+): Matrix4 {
+  const turn = new Quaternion().setFromAxisAngle(UP, hdg);
+  if (slope) turn.multiply(new Quaternion().setFromAxisAngle(ACROSS, -Math.atan(slope)));
+  return at.compose(new Vector3(x, y, z), turn, new Vector3(length, width, height));
+}

@@ -1,0 +1,87 @@
+"""A run in three dimensions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Locator, expect
+
+from tests.browser.pages import OdscenPage
+from tests.browser.test_interruptions import begun
+from tools.page import Served
+
+
+def colours(stage: Locator, path: str) -> np.ndarray:
+    """Pixels of what is seen, rows by columns by red, green and blue."""
+    stage.screenshot(path=path)
+    with Image.open(path) as opened:
+        return np.asarray(opened.convert("RGB"), dtype=float)
+
+
+@pytest.mark.slow
+def test_a_run_is_seen_from_above_from_behind_and_from_the_seat_and_as_a_plan_again(
+    open_page: Callable[..., OdscenPage],
+    served: Served,
+    sampled: str,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    folder = tmp_path_factory.mktemp("scenery")
+    user = open_page(served.url)
+    loaded: list[str] = []
+    user.page.on("request", lambda request: loaded.append(request.url))
+    begun(user, sampled, speed=None)
+    expect(user.page.get_by_label("Moment of the run")).to_be_visible()
+    assert not [url for url in loaded if "SceneryView" in url]  # it comes when it is wanted
+    stage = user.page.locator(".scenery")
+    pictures = []
+    for look in ("3D, from above", "3D, following", "3D, driver's seat"):
+        user.choose("View", look)
+        expect(stage.locator("canvas")).to_be_visible()
+        stage.evaluate(
+            "one => new Promise(done => requestAnimationFrame(() => setTimeout(done, 800)))"
+        )
+        pictures.append(colours(stage, str(folder / f"{len(pictures)}.png")))
+    for picture in pictures:  # land, roads, bodies
+        assert len(np.unique(picture[::7, ::7].reshape(-1, 3), axis=0)) > 20
+    for one, other in pairwise(pictures):
+        assert np.abs(one - other).mean() > 5
+    sky = pictures[2][2, pictures[2].shape[1] // 3]
+    assert sky[2] > sky[0]  # noon
+    assert len([url for url in loaded if "SceneryView" in url and url.endswith(".js")]) == 1
+    expect(user.page).to_have_url(re.compile("camera=seat"))
+    user.page.reload()
+    expect(stage.locator("canvas")).to_be_visible()
+    user.choose("View", "Plan")
+    expect(stage).to_have_count(0)
+    expect(user.page.locator('canvas[data-layer="moving"]').first).to_be_visible()
+
+
+@pytest.mark.slow
+def test_arrow_keys_and_zoom_move_the_camera(
+    open_page: Callable[..., OdscenPage],
+    served: Served,
+    sampled: str,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    folder = tmp_path_factory.mktemp("keys")
+    user = open_page(served.url)
+    begun(user, sampled, speed=None)
+    expect(user.page.get_by_label("Moment of the run")).to_be_visible()
+    user.choose("View", "3D, from above")
+    stage = user.page.locator(".scenery")
+    expect(stage.locator("canvas")).to_be_visible()
+    stage.focus()
+    seen = []
+    for key in ("", "ArrowLeft", "+", "-"):
+        if key:
+            user.page.keyboard.press(key)
+        user.page.wait_for_timeout(600)
+        seen.append(colours(stage, str(folder / f"{len(seen)}.png")))
+    assert np.abs(seen[0] - seen[1]).mean() > 1
+    assert np.abs(seen[1] - seen[2]).mean() > 1
+    assert np.abs(seen[1] - seen[3]).mean() < 1  # nearer and back
