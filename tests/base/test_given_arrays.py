@@ -101,15 +101,12 @@ def test_what_is_not_an_array_is_refused_by_name(data: Callable[[], bytes], word
     assert str(refused.value).startswith("f: ")
 
 
-def test_a_file_that_unpacks_to_too_much_is_refused_before_it_is_unpacked(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_file_that_unpacks_to_too_much_is_refused_before_it_is_unpacked() -> None:
     np.savez_compressed(buffer := io.BytesIO(), a=np.zeros(10**6))
     data = buffer.getvalue()
     assert len(data) < 20_000
-    monkeypatch.setattr(given_arrays, "MOST_UNPACKED", 10**6)
     with pytest.raises(InputError, match="its arrays have 8,000,128 bytes; 1,000,000 are"):
-        arrays_from_npz(data)
+        arrays_from_npz(data, most=10**6)
 
 
 def test_a_file_of_too_many_arrays_is_refused() -> None:

@@ -23,6 +23,7 @@ def test_an_option_and_its_value_are_left_out_however_they_are_written() -> None
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_other_python_carries_the_command_out_with_its_words_and_exit_code() -> None:
     words = ["--carla", "127.0.0.1:9", "--timeout", "0.5", "--selfcheck", "--json"]
     command = [sys.executable, "-m", "odscen", "cosim", *words]

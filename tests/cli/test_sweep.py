@@ -49,6 +49,7 @@ def test_a_sweep_has_a_folder_a_table_and_a_page(
     assert alone.code == 0
 
 
+@pytest.mark.slow
 def test_a_dry_run_lists_the_cases_and_runs_none(scenario: Path, tmp_path: Path) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text('[[vary]]\nparameter = "per_minute"\nfrom = 2\nto = 8\nsteps = 3\n')

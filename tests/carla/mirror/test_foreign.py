@@ -82,6 +82,7 @@ def test_traffic_brakes_for_two_vehicles_that_another_client_drives_and_resumes_
     assert arrived == {"south"}, "the hero has gone away, the other one stays"
 
 
+@pytest.mark.slow
 def test_foreign_vehicles_are_in_no_count_and_in_no_recording(
     workspace: Workspace, tmp_path: Path
 ) -> None:

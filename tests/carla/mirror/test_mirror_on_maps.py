@@ -235,6 +235,7 @@ def test_sensors_see_speeds_only_where_vehicles_keep_physics(
     assert max(wrong) <= 0.1
 
 
+@pytest.mark.slow
 def test_bodies_are_in_the_middle_of_boxes_that_are_not_around_their_origin(
     workspace: Workspace, sample: Sample, tmp_path: Path
 ) -> None:

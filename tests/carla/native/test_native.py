@@ -79,6 +79,7 @@ def test_what_carla_alone_does_not_do_of_rules_is_said(sample: Sample) -> None:
     assert words_of(ruled) == [f"CARLA alone does not do rule r of {name}: brake, go, horn"]
 
 
+@pytest.mark.slow
 def test_what_carla_alone_does_not_do_of_actors_measures_and_parking_is_said(
     sample: Sample,
 ) -> None:

@@ -26,6 +26,7 @@ DEPARTS = {"a": 0.0, "b": 0.33, "c": 0.5, "d": 1.27, "e": 2.01}
 """Seconds, some between two ticks."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("physics", [False, True])
 def test_departures_are_within_a_tick_of_the_plan_and_cost_no_ticks(
     workspace: Workspace, tmp_path: Path, physics: bool

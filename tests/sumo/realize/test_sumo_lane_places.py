@@ -27,6 +27,7 @@ def test_a_street_over_a_junction():
     assert dict(places.segments.rows()) == {"r1": 98.0, "r3": 98.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*SHIPPED, "motorway_weave", "t_junction_signs", "town_5x5"])
 def test_every_lane_for_vehicles_has_one_place_on_shipped_maps(name):
     sumo_map = built(name).sumo

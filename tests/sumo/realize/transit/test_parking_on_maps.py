@@ -121,6 +121,7 @@ def test_an_area_never_holds_more_cars_than_it_has_places(tmp_path: Path) -> Non
     assert stays.filter(~pl.col("begins")).height == whole.ended
 
 
+@pytest.mark.slow
 def test_without_parking_the_files_of_a_run_are_as_before() -> None:
     town = parking_town().sumo
     plain = realize(parking_scenario({}), town)
