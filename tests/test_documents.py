@@ -49,13 +49,20 @@ def anchors(text: str) -> set[str]:
     return {heading.replace(" ", "-") for heading in plain} | set(re.findall(r'id="([^"]+)"', text))
 
 
+def is_module(name: str) -> bool:
+    try:
+        return find_spec(name) is not None
+    except ModuleNotFoundError:
+        return False
+
+
 def exists(module: str) -> bool:
     """Whether a module, or a name in one, is there: ``odscen.base.frames.sumo_to_xodr``."""
     if module.split(".")[1] in (*odscen.__all__, *odscen.MODULES):
         try:
             operator.attrgetter(module.partition(".")[2])(odscen)
-        except AttributeError:
-            return False
+        except AttributeError:  # unless it is a module that nothing has imported yet
+            return is_module(module)
         return True
     for parts in (module, module.rpartition(".")[0]):
         try:
