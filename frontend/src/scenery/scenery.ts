@@ -39,9 +39,6 @@ const COAT = 0.015;
 const STOP_LINE = 0.4;
 /** Of a building whose height the map does not draw, m. */
 const STOREYS = [6, 9, 12];
-/** Milliseconds of a picture from which on it is drawn with fewer pixels, and below which with more. */
-const [SLOW, FAST] = [45, 14];
-const [COARSEST, FINER] = [0.5, 1.25];
 /** Cells along the longer side of the land around roads. */
 const LAND_CELLS = 120;
 const DROPS = 900;
@@ -50,7 +47,7 @@ const TILT = Math.PI / 2 - 0.05;
 /** A map and its road users in three dimensions; drawn when something has changed. */
 export class Scenery {
   readonly canvas: HTMLCanvasElement;
-  /** For the benchmark: how often something was drawn, and for how long. */
+  /** How often something was drawn, and for how many milliseconds the page was busy with it. */
   readonly stats = { frames: 0, busy: 0 };
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
@@ -67,9 +64,8 @@ export class Scenery {
   private moving: Moving | null = null;
   private mode: Camera = "above";
   private size: Size = { width: 1, height: 1 };
-  private ratio: number;
+  private readonly ratio: number;
   private pending = 0;
-  private lag = 0;
 
   constructor(
     host: HTMLElement,
@@ -305,21 +301,8 @@ export class Scenery {
       this.rain.rotation.z = (began / 90) % (2 * Math.PI);
     }
     this.renderer.render(this.scene, this.camera);
-    const busy = performance.now() - began;
     this.stats.frames += 1;
-    this.stats.busy += busy;
-    this.lag += (busy - this.lag) / 8;
-    this.adapt();
-  }
-
-  /** Fewer pixels where drawing takes long, as without a graphics card. */
-  private adapt(): void {
-    const slower = this.lag > SLOW && this.ratio > COARSEST;
-    const faster = this.lag < FAST && this.ratio * FINER <= window.devicePixelRatio;
-    if (!slower && !faster) return;
-    this.ratio = slower ? Math.max(this.ratio / FINER, COARSEST) : this.ratio * FINER;
-    this.lag = (SLOW + FAST) / 2;
-    this.resize();
+    this.stats.busy += performance.now() - began;
   }
 
   private resize(): void {

@@ -80,7 +80,7 @@ def replay_values(
         piece
         for [name], own in kept.group_by("id", maintain_order=True)
         if (user := known.get(str(name))) is not None
-        for piece in _pieces_of(user, own)
+        for piece in _split_pieces(user, own)
     ]
     if not pieces:
         return None
@@ -98,7 +98,7 @@ def replay_values(
     frames = int(kept["frame"].max()) + 1  # type: ignore[arg-type]  # a column of integers
     data = {
         "begin": round(first, 3), "step": round(step * every, 6), "frames": frames,
-        "clock": clock, "pieces": pieces, "lights": _shown_lights(lights, states),
+        "clock": clock, "pieces": pieces, "lights": _list_lights(lights, states),
     }  # fmt: skip
     text = json.dumps(data, separators=(",", ":"), sort_keys=True).replace("<", "\\u003c")
     return {
@@ -115,16 +115,16 @@ def _choose_view(rows: pl.DataFrame, drawing: MapDrawing | None) -> Bounds:
     """Where somebody was; the whole map if that is most of it."""
     fitted = fitted_view(rows.select("x", "y").to_numpy(), drawing)
     assert fitted is not None  # there are places
-    if drawing is None or _area(fitted) < _MOST_OF_MAP * _area(drawing.bounds):
+    if drawing is None or _measure_area(fitted) < _MOST_OF_MAP * _measure_area(drawing.bounds):
         return fitted
     return drawing.bounds
 
 
-def _area(bounds: Bounds) -> float:
+def _measure_area(bounds: Bounds) -> float:
     return (bounds[2] - bounds[0]) * (bounds[3] - bounds[1])
 
 
-def _shown_lights(lights: Sequence[SumoLight], states: pl.DataFrame | None) -> list[dict[str, Any]]:
+def _list_lights(lights: Sequence[SumoLight], states: pl.DataFrame | None) -> list[dict[str, Any]]:
     """Heads of each light that was recorded, and when it showed which state."""
     if states is None:
         return []
@@ -153,7 +153,7 @@ def _signal_heads(light: SumoLight) -> list[list[Any]]:
     return list(places.values())
 
 
-def _pieces_of(user: PlannedActor, own: pl.DataFrame) -> list[dict[str, Any]]:
+def _split_pieces(user: PlannedActor, own: pl.DataFrame) -> list[dict[str, Any]]:
     """Stretches without a gap: first value and differences of x, y (cm) and heading."""
     frame = own["frame"].to_numpy()
     heading = np.unwrap(own["hdg"].to_numpy())

@@ -249,10 +249,10 @@ def calibrate(
         for target, old, new in zip(parts, before.values, found.measured.values, strict=True)
     )
     distances = {
-        "before": _distance(parts, before.values, held=False),
-        "after": _distance(parts, found.measured.values, held=False),
-        "validation_before": _distance(parts, before.values, held=True),
-        "validation_after": _distance(parts, found.measured.values, held=True),
+        "before": _measure_distance(parts, before.values, held=False),
+        "after": _measure_distance(parts, found.measured.values, held=False),
+        "validation_before": _measure_distance(parts, before.values, held=True),
+        "validation_after": _measure_distance(parts, found.measured.values, held=True),
     }
     doubts = doubts_of(document, found.scenario, parts, before, found.measured, distances)
     return Calibration(
@@ -313,7 +313,7 @@ class _Work:
                 vehicles.append(number)
                 if run.usability.get("level") != "usable":
                     verdicts.append(str(run.usability.get("headline", "")))
-        means = tuple(_mean([row[n] for row in rows]) for n in range(len(self.targets)))
+        means = tuple(_average_known([row[n] for row in rows]) for n in range(len(self.targets)))
         flows = [
             value or 0.0
             for target, value in zip(self.targets, means, strict=True)
@@ -322,7 +322,7 @@ class _Work:
         return Measured(means, sum(vehicles) / len(vehicles), sum(flows), tuple(verdicts))
 
     def distance(self, measured: Measured) -> float:
-        found = _distance(self.targets, measured.values, held=False)
+        found = _measure_distance(self.targets, measured.values, held=False)
         return math.inf if found is None else found
 
     def try_scenario(self, best: _Best, scenario: Scenario, what: str) -> bool:
@@ -464,12 +464,12 @@ def _try_knobs(work: _Work, best: _Best, knobs: Sequence[Knob]) -> None:
 # ---------------------------------------------------------------------------- distances
 
 
-def _mean(values: Sequence[float | None]) -> float | None:
+def _average_known(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return sum(known) / len(known) if known else None
 
 
-def _distance(
+def _measure_distance(
     targets: Sequence[Target], values: Sequence[float | None], *, held: bool
 ) -> float | None:
     """Mean over the kinds of the root mean square distance; each kind weighs the same."""
@@ -485,7 +485,7 @@ def _distance(
 def _mean_distance(fits: Sequence[TargetFit], *, after: bool) -> float:
     targets = [fit.target._replace(held=False) for fit in fits]
     values = [fit.after if after else fit.before for fit in fits]
-    return _distance(targets, values, held=False) or 0.0
+    return _measure_distance(targets, values, held=False) or 0.0
 
 
 _MISSING: Final = 10.0
