@@ -367,6 +367,39 @@ def test_each_kind_of_place_is_on_the_map(tmp_path: Path, name: str) -> None:
     assert found.lists["refused"] == []  # the centre of the ego is 1.4 m ahead of its axle
 
 
+def test_who_follows_a_route_against_the_road_looks_along_the_route(tmp_path: Path) -> None:
+    route = ROUTE.replace('laneId="-2" s="10"', 'laneId="1" s="400"').replace(
+        'laneId="-2"\ns="400"', 'laneId="1"\ns="10"'
+    )
+    place = route.format('<FromRoadCoordinates pathS="300" t="1.75"/>')
+    there = entity_condition(
+        f'<ReachPositionCondition tolerance="2"><Position>{place}</Position>'
+        "</ReachPositionCondition>"
+    )
+    width = '<width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
+    left = f'<left><lane id="1" type="driving">{width}</lane></left><center>'
+    (tmp_path / "road.xodr").write_text(ROAD.replace("<center>", left, 1))
+    (tmp_path / "scene.xosc").write_text(scene(event("near", private(SPEED), there)))
+    found = import_file(Workspace.open(tmp_path / "w"), tmp_path / "scene.xosc")
+    # 300 m from s = 400 m against s, and the centre of the body 1.4 m ahead of its axle
+    assert rule(found, "near")["when"]["reaches"]["place"] == pytest.approx((98.6, 1.75), abs=1e-3)
+
+
+def test_a_walker_without_a_speed_stands_on_its_trajectory(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    found = read(workspace, tmp_path, meeting(WALKER), lines=CATALOG)
+    [first] = [one for one in found.scenario.rules if one.id == "init-VRU"]
+    doing = [action.model_dump(exclude_none=True, exclude_defaults=True) for action in first.then]
+    assert "appear" in doing[0]
+    assert "'speed': {'to': 0.0" in str(doing[1])
+    settings = RunSettings(until=2.0)
+    done = run(workspace, found.scenario, settings=settings, name="stands", out=tmp_path / "r")
+    rows = done.trajectories()
+    y = rows.filter((rows["id"] == "VRU") & (rows["time"] > 0.15))["y"].to_numpy()
+    assert y == pytest.approx(np.full(len(y), -4.75), abs=0.01)
+
+
 NOTHING = {
     "visibility": private('<VisibilityAction graphics="true" traffic="true" sensors="false"/>'),
     "lights": private('<AppearanceAction><LightStateAction><LightType><VehicleLight '

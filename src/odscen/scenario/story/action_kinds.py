@@ -625,7 +625,7 @@ def synchronise(part: Arriving, acting_actor: ActingActor, end: float) -> float:
         channel.take_speed(steady(acting_actor.instant, 0.0), acting_actor.owner)
         return math.inf
     left = theirs / other.speed - done
-    law = arrival_law(part, acting_actor.instant, mine, left)
+    law = arrival_law(part, acting_actor.instant, mine, left, acting_actor.speed)
     needed = law.speed(acting_actor.instant) if left > 0.0 else math.inf
     fastest = FASTEST_WALKER if acting_actor.actor.person else FASTEST_VEHICLE
     if needed > fastest:
@@ -635,13 +635,15 @@ def synchronise(part: Arriving, acting_actor: ActingActor, end: float) -> float:
     return acting_actor.instant + left if settled else math.inf
 
 
-def arrival_law(part: Arriving, instant: float, rest: float, left: float) -> AnyLaw:
+def arrival_law(part: Arriving, instant: float, rest: float, left: float, speed: float) -> AnyLaw:
     """Speed that covers ``rest`` metres in ``left`` seconds, even or to the speed on arrival.
 
-        D = rest - steady, T = left - steady/u, u the speed on arrival: v = 2 D/T - u
+        D = rest - steady, T = left - steady/u, v the ``speed`` at first, u that on arrival, m/s
+        w = D/T ± sqrt((D/T)² - (v + u) D/T + (v² + u²)/2), + where D/T > (v + u)/2
 
-    From v it changes evenly to u, within T. Where v would be negative the actor first stands; where
-    there is no time left for a change its speed is even.
+    From v it changes evenly to w and from there to u, both as fast: at (2 w - v - u)/T m/s². Where
+    w would be negative the actor stands in between, and brakes and leaves at (v² + u²)/(2 D).
+    Where there is no time left for a change its speed is even.
     """
     last = part.speed
     even = steady(instant, rest / left if left > 0.0 else math.inf)
@@ -650,11 +652,16 @@ def arrival_law(part: Arriving, instant: float, rest: float, left: float) -> Any
     metres, seconds = rest - part.steady, left - (part.steady / last if last else 0.0)
     if metres <= 0.0 or seconds <= _SAME:
         return even
-    first = 2.0 * metres / seconds - last
-    if first >= 0.0:
-        return SpeedTable(instant, ((0.0, first), (seconds, last)))
-    waits = seconds - 2.0 * metres / last
-    return SpeedTable(instant, ((0.0, 0.0), (waits, 0.0), (seconds, last)))
+    mean, middle = metres / seconds, (speed + last) / 2.0
+    root = math.sqrt(max((mean - middle) ** 2 + (speed - last) ** 2 / 4.0, 0.0))
+    between = mean + math.copysign(root, mean - middle)
+    if between >= 0.0:
+        gains = abs(between - speed) + abs(between - last)
+        turn = seconds * (abs(between - speed) / gains if gains > _SAME else 0.5)
+        return SpeedTable(instant, ((0.0, speed), (turn, between), (seconds, last)))
+    pace = 2.0 * metres / (speed**2 + last**2)  # seconds for each m/s
+    stops, leaves = pace * speed, seconds - pace * last
+    return SpeedTable(instant, ((0.0, speed), (stops, 0.0), (leaves, 0.0), (seconds, last)))
 
 
 def _own_rest(part: Arriving, acting_actor: ActingActor) -> float:
@@ -942,14 +949,16 @@ ACTIONS = {
         ),
         ActionKind(
             "arrive", "be `at` a place at the instant at which `to` is `when_at` another; the "
-            "speed is settled once that of `to` is steady; with `speed` it changes evenly to that, "
-            "which is reached `steady` metres before the place", "m/s, m",
+            "speed is settled once that of `to` is steady; with `speed` it changes from its own to one "
+            "in between and from there to that, equally hard, and waits in between where it "
+            "would be too early; `speed` is reached `steady` metres before the place", "m/s, m",
             "`setSpeed` or `person.moveToXY`", "SynchronizeAction", _MIRRORED, arrive,
             synchronise, end_of_arrival,
         ),
         ActionKind(
             "appear", "be on the road from now on, where it is placed or `at` x, y and heading of "
-            "its centre, with its initial or a given `speed`; before that it is not there", "m/s",
+            "its centre, with its initial or a given `speed`; before that it is not there; whom the story "
+            "drives is first seen a step later, where it has driven by then", "m/s",
             "`add` on a whole step", "AddEntityAction", _MIRRORED, update=has_appeared,
             ask=ask_to_appear, says=lambda _: "appears",
         ),

@@ -210,6 +210,20 @@ def test_an_actor_appears_when_a_rule_says_so_where_it_says(tmp_path: Path, step
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("step", STEPS)
+def test_whom_the_story_drives_has_driven_on_since_it_appeared(tmp_path: Path, step: float) -> None:
+    actors = [
+        fast("ego", 370.0, MIDDLE, 10.0, ego=True),
+        fast("van", 460.0, RIGHT, driver="story"),
+    ]
+    rules = [after(3.0, {"appear": {"at": [430.0, LEFT, 0.0], "speed": 15.0}})]
+    van = run(document(MOTORWAY, actors, rules, step=step), tmp_path / "run").tracks["van"]
+    assert van.time[0] == pytest.approx(3.0 + step)
+    x = np.array([van.centre(float(time))[0] for time in van.time])
+    assert x == pytest.approx(430.0 + 15.0 * (van.time - 3.0), abs=0.02)
+
+
+@pytest.mark.slow
 def test_a_run_waits_for_whom_a_rule_lets_appear(tmp_path: Path) -> None:
     actors = [
         fast("van", 860.0, MIDDLE, depart=0.0),

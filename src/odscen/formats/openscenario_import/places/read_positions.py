@@ -392,8 +392,12 @@ class PositionReader:
         if inside.tag == "FromLaneCoordinates":
             return self._in_lane(inside, there)
         t = self.side * self.report.number(inside, "t", 0.0)
-        s = float(lanes.s[there.node]) + self.ahead_of(there.node, there)
-        return self._on_road(kind, key.road, s, t)
+        ahead = self.ahead_of(there.node, there)
+        forward = bool(lanes.lanes.forward[int(lanes.lane[there.node])])
+        s = float(lanes.s[there.node]) + (ahead if forward else -ahead)
+        found = self._on_road(kind, key.road, s, t)
+        against = math.cos(found.hdg - there.hdg) < 0.0  # who follows the route looks along it
+        return found._replace(hdg=found.hdg + math.pi) if against else found
 
     def _in_lane(self, inside: _Element, at: MapPoint) -> MapPoint:
         """Where a point lies on the lane of a road whose id an element gives, and its offset."""

@@ -463,6 +463,8 @@ class InitReader:
             made["size"] = entity.body._asdict()
         if entity.category is Category.PEDESTRIAN:
             made |= self._places.walker(centre)
+            if then and not changes:  # entities stand until an action gives them a speed
+                then = [{"speed": {"to": 0.0, "shape": "step"}}, *then]
             then = then or [{"stop": {}}]
             if not late:
                 then = [{"appear": {"at": [centre.x, centre.y, centre.hdg]}}, *then]

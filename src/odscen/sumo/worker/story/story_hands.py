@@ -37,12 +37,13 @@ class StoryHands:
         actors: Mapping[str, PlannedActor],
         *,
         net_offset: tuple[float, float],
+        step: float,
     ) -> None:
         self.lost: list[Event] = []
         self.over = False
         self._plan = plan
         self._actors = actors
-        self._offset = net_offset
+        self._offset, self._step = net_offset, step
         self._added: set[str] = set()
         self._dark: dict[str, str] = {}
         self._goals: dict[str, str] = {}
@@ -135,9 +136,16 @@ class StoryHands:
                 self._faster[wanted_actor.actor] = float(begin)
         if wanted_actor.at is not None:
             x, y, hdg = wanted_actor.at
-            half = self._actors[wanted_actor.actor].length / 2.0
-            x += half * math.cos(hdg) + self._offset[0]
-            y += half * math.sin(hdg) + self._offset[1]
+            ahead = self._actors[wanted_actor.actor].length / 2.0
+            if not held.person and wanted_actor.actor in self._plan.by_story:
+                # SUMO has it on the road a step later, by when it has driven on.
+                own_speed = held.attributes["departSpeed"]
+                speed = wanted_actor.speed
+                if speed is None:
+                    speed = 0.0 if own_speed == "avg" else float(own_speed)
+                ahead += speed * self._step
+            x += ahead * math.cos(hdg) + self._offset[0]
+            y += ahead * math.sin(hdg) + self._offset[1]
             if not held.person and road.off_lanes(
                 x, y, width=self._actors[wanted_actor.actor].width
             ):

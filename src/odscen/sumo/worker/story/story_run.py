@@ -56,7 +56,9 @@ class StoryRun:
         )
         self._read_wishes(story)
         self._end = EndWatch(plan, self._view)
-        self._hands = StoryHands(story, self._planned, net_offset=plan.net_offset)
+        self._hands = StoryHands(
+            story, self._planned, net_offset=plan.net_offset, step=plan.step_length
+        )
         self._rules = story.rules
         self._contacts = BodyContacts(self._planned, plan.net_offset, story.by_story)
         self._step = plan.step_length

@@ -23,6 +23,8 @@ _USUAL_WALK = 1.39
 """m/s at which pedestrians walk, see :data:`odscen.sumo.realize.driving.KINDS`."""
 _ON_LANE = 1.5
 """Metres from its centre line in which a place is on a lane."""
+_ABREAST = 6.0
+"""Metres beside a lane in which a place is abreast of it, as of one in the middle of a junction."""
 _MORE = 0.5
 """m/s² more than a vehicle type gains, for what steps round."""
 _BEHIND = -10.0
@@ -159,8 +161,22 @@ class StoryView:
             where = self._lane_position_of(to)
         metres = self._road.driving_distance(actor, *where)
         if metres is None and other is None:
-            return _metres_under_body(own, self.place(to))
+            under = _metres_under_body(own, self.place(to))
+            return self._metres_abreast(own, self.place(to)) if under is None else under
         return None if metres is None or metres < _BEHIND else metres + ahead
+
+    def _metres_abreast(self, own: ActorView, place: Point) -> float | None:
+        """Metres from the centre of an actor to where a place lies beside the lane that it takes.
+
+        In a junction the lane nearest to a place may be one that turns off before.
+        """
+        line = self.lane_line(own.id, 0)
+        if line is None:
+            return None
+        there, here = beside(line, place), beside(line, (own.x, own.y))
+        ahead = there.along - here.along
+        within = 0.0 < ahead and there.along < line_length(line) and abs(there.left) < _ABREAST
+        return ahead if within else None
 
     def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
         """Centre line of the lane ``by`` lanes to the left of an actor's."""
