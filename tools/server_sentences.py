@@ -28,6 +28,7 @@ SHOWN = (
     "carla/mirror/",
     "carla/served/",
     "carla/server/",
+    "esmini/",
     "metadrive/metadrive_run",
     "convert/",
     "formats/__init__",

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from odscen.app.running.runs import check_file, prepare_run
-from odscen.metadrive.hand_over import SIDEWAYS, SumoTracks, drives_of, speed_along, write_job
+from odscen.metadrive.hand_over import SIDEWAYS, drives_of, speed_along, write_job
 from odscen.runs.run_settings import RunSettings
+from odscen.sumo.runner.tracked_run import SumoTracks
 
 if TYPE_CHECKING:
     from pathlib import Path

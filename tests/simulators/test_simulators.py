@@ -39,7 +39,14 @@ def steady(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_one_list_has_those_that_ship_and_those_of_packages(steady: str) -> None:
-    assert simulator_names() == ["sumo", "carla-mirror", "carla-native", "metadrive", steady]
+    assert simulator_names() == [
+        "sumo",
+        "carla-mirror",
+        "carla-native",
+        "metadrive",
+        "esmini",
+        steady,
+    ]
     offered = {one.name: one for one in installed_simulators()}
     assert not any(one.error for one in offered.values())
     assert offered[steady].summary == "All at a constant speed, through each other."
@@ -149,7 +156,7 @@ def test_what_it_cannot_follow_and_unknown_names_are_refused(
     with pytest.raises(InputError, match=words) as refused:
         odscen.run(workspace, sampled, settings=RunSettings(**wanted))
     if "simulator" in settings:
-        assert "sumo, carla-mirror, carla-native, metadrive, steady" in str(refused.value)
+        assert "sumo, carla-mirror, carla-native, metadrive, esmini, steady" in str(refused.value)
 
 
 @pytest.mark.parametrize(

@@ -30,19 +30,21 @@ def start(client: TestClient, scenario: str, name: str, **options: object) -> An
 
 def test_simulators_are_offered_with_their_options(client: TestClient, steady: str) -> None:
     offered = {one["name"]: one for one in client.get("/api/simulators").json()}
-    assert [*offered] == ["sumo", "carla-mirror", "carla-native", "metadrive", steady]
+    assert [*offered] == ["sumo", "carla-mirror", "carla-native", "metadrive", "esmini", steady]
     assert not any(one["error"] for one in offered.values())
     assert [one["name"] for one in offered["carla-native"]["options"]] == ["physics"]
     assert [one["name"] for one in offered["metadrive"]["options"]] == ["ego", "traffic"]
+    assert [one["name"] for one in offered["esmini"]["options"]] == ["play"]
     assert offered[steady]["options"][0]["usual"] == 8.0
 
 
 def test_a_page_cannot_choose_what_program_the_server_starts(
     client: TestClient, sampled: str
 ) -> None:
-    refused = start(client, sampled, "metadrive", python="/bin/true")
-    assert refused.status_code == 422
-    assert "where this server is started" in refused.text
+    for name, option in (("metadrive", "python"), ("esmini", "program")):
+        refused = start(client, sampled, name, **{option: "/bin/true"})
+        assert refused.status_code == 422
+        assert "where this server is started" in refused.text
 
 
 def test_a_run_of_the_page_is_played_by_the_simulator_that_is_chosen(

@@ -90,8 +90,8 @@ BehaviourTimeoutOption = Annotated[
 SimulatorOption = Annotated[
     str,
     typer.Option(
-        help="What plays the scenario: sumo, carla-mirror, carla-native, metadrive, an entry "
-        "point, package.module:Class or FILE.py:Class.",
+        help="What plays the scenario: sumo, carla-mirror, carla-native, metadrive, esmini, an "
+        "entry point, package.module:Class or FILE.py:Class.",
         metavar="NAME",
     ),
 ]

@@ -168,6 +168,14 @@ def run(
     behaviour_timeout: BehaviourTimeoutOption = 60.0,
     simulator: SimulatorOption = "sumo",
     simulator_set: SimulatorSettingOption = None,
+    esmini: Annotated[
+        Path | None,
+        typer.Option(
+            help="Play the scenario in this program of esmini: as --simulator esmini with its "
+            "program.",
+            metavar="PROGRAM",
+        ),
+    ] = None,
     reports: Annotated[
         bool | None,
         typer.Option(
@@ -202,6 +210,13 @@ def run(
     completed; 1: completed, but an expectation failed; 2: bad input, or the folder is in the hands
     of another process; 3: a run failed, or the machine lacks room, memory or handles.
     """
+    simulator_set = simulator_set or []
+    if esmini is not None:
+        if simulator not in ("sumo", "esmini"):
+            raise typer.BadParameter(
+                f"the program of esmini is not that of {simulator}", param_hint="--esmini"
+            )
+        simulator, simulator_set = "esmini", [*simulator_set, f"program={esmini}"]
     if simulator == "sumo":
         from odscen.sumo.runner.forked_worker import get_ready
 
@@ -238,7 +253,7 @@ def run(
         behaviour=behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout),
         after_story=_read_after_story(after_story),
         simulator=simulator,
-        simulator_options=option_settings(simulator_set or (), element="--simulator-set"),
+        simulator_options=option_settings(simulator_set, element="--simulator-set"),
     )
     paths = scenario_files(scenarios)
     store = Workspace.open(workspace)

@@ -17,7 +17,7 @@ number, or -1) and ``arrives`` (whether the path ends at its goal).
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from odscen.lanegraph.graphs import LaneGraph
     from odscen.records.run_plan import Plan, PlannedActor
     from odscen.simulators.assets import Assets
-    from odscen.sumo.runner.in_step import Step
+    from odscen.sumo.runner.tracked_run import SumoTracks
 
 DRIVES = ("replay", "tracking", "idm")
 """What moves a road user in MetaDrive: it is put where SUMO had it; physics, steered and driven to
@@ -51,39 +51,6 @@ _SAME_DIRECTION = 0.7
 """Radians by which a node's direction may differ from that of who is on its lane."""
 _APART = 0.5
 """Metres between two points of a path at least, for its bends."""
-
-
-class SumoTracks(NamedTuple):
-    """Where SUMO had road users, as of :class:`~odscen.sumo.runner.in_step.Step`, step by step."""
-
-    times: FloatArray
-    start: IntArray
-    row: IntArray
-    x: FloatArray
-    y: FloatArray
-    z: FloatArray
-    hdg: FloatArray
-    speed: FloatArray
-
-    @classmethod
-    def of(cls, steps: Sequence[Step]) -> SumoTracks:
-        """All steps, one after the other."""
-
-        def join(name: str) -> Any:
-            parts = [getattr(step, name) for step in steps]
-            return np.concatenate(parts) if parts else np.empty(0)
-
-        return cls(
-            np.array([step.time for step in steps], dtype=np.float64),
-            offsets([len(step.index) for step in steps]),
-            join("index").astype(np.int64),
-            *(join(name).astype(np.float64) for name in ("x", "y", "z", "hdg", "speed")),
-        )
-
-    @property
-    def when(self) -> FloatArray:
-        """Time of each row, s."""
-        return np.repeat(self.times, np.diff(self.start))
 
 
 def write_job(

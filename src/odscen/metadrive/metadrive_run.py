@@ -22,35 +22,27 @@ import numpy as np
 
 from odscen.base.atomic_folders import passing_folder
 from odscen.base.errors import InputError, MissingDependencyError
-from odscen.convert.lane_table.table_json import table_from_json
-from odscen.drawing.map_drawing import MapDrawing
 from odscen.formats.recordings.map_elements import map_elements
-from odscen.metadrive.hand_over import DRIVES, SumoTracks, drives_of, write_job
+from odscen.metadrive.hand_over import DRIVES, drives_of, write_job
 from odscen.opendrive.parse import parse
 from odscen.runs.new_run import PreparedRun, SimulationOutcome
-from odscen.runs.reporter import Progress
 from odscen.scenario.document.problems import warning
 from odscen.simulators.base import Simulator
-from odscen.simulators.parity_files import PARITY_STATES, write_parity
-from odscen.simulators.positions import Position, PositionRecord
 from odscen.sumo.realize.road_users.free_flow import environment_effect
 from odscen.sumo.realize.run_map import RunMap
-from odscen.sumo.runner.elevation import ElevationLookup
-from odscen.sumo.runner.in_step import InStep
-from odscen.sumo.runner.run_jobs import simulate
 from odscen.sumo.runner.sumo_simulator import SumoSimulator
+from odscen.sumo.runner.tracked_run import ShownRun, ShownUser, simulate_tracked
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from odscen.records.run_plan import Plan
     from odscen.runs.reporter import Reporter
     from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.simulators.base import SimulatedMap
-    from odscen.sumo.runner.in_step import Step
     from odscen.sumo.runner.run_folder import SumoPreparedRun
+    from odscen.sumo.runner.tracked_run import SumoTracks
 
 PYTHON_VARIABLE = "ODSCEN_METADRIVE_PYTHON"
 """Names the Python that has MetaDrive, where no option does."""
@@ -59,8 +51,6 @@ LOG_FILE = "metadrive.log"
 SILENCE = 300.0
 """Seconds without a line after which MetaDrive's process is ended; building a large map takes
 some."""
-APART = 2.0
-"""Seconds without a contact after which one of the same two is another collision."""
 _LOOK = 0.5
 
 
@@ -192,15 +182,14 @@ class MetaDrive(Simulator[MetaDriveRun]):
         """Run SUMO, replay its run in MetaDrive, and compare both."""
         begin = time.perf_counter()
         with passing_folder(folder.parent) as staging:
-            steps: list[Step] = []
-            outcome = self._run_sumo(prepared, staging, steps, reporter)
+            on, scenario = prepared.on, prepared.scenario
+            place = staging / "sumo-run"
+            outcome, tracks = simulate_tracked(prepared.sumo, on, place, reporter)
             if outcome.sim_seconds is None or outcome.error or outcome.stopped:
                 return SimulationOutcome(
                     None, None, outcome.wall_seconds, error=outcome.error or "it was stopped"
                 )
-            tracks = SumoTracks.of(steps)
             drives = drives_of(prepared.plan, ego=self.ego, traffic=self.traffic)
-            on, scenario = prepared.on, prepared.scenario
             job = staging / "job"
             job.mkdir()
             write_job(
@@ -213,7 +202,7 @@ class MetaDrive(Simulator[MetaDriveRun]):
                 assets=on.assets,
                 grip=environment_effect(scenario.environment, on.assets).grip,
             )
-            shown = _ShownRun(prepared, tracks, drives)
+            shown = _ShownInMetaDrive(prepared, tracks)
             error, stopped = self._follow_child(job, folder, shown, reporter, prepared)
         outcome = shown.write(folder)
         for words in shown.notes():
@@ -249,23 +238,11 @@ class MetaDrive(Simulator[MetaDriveRun]):
             )
         return words[0], words[1]
 
-    def _run_sumo(
-        self, prepared: MetaDriveRun, staging: Path, steps: list[Step], reporter: Reporter
-    ) -> SimulationOutcome:
-        """Run SUMO in a folder of its own, and keep where all are after each step."""
-        on, plan = prepared.on, prepared.plan
-        place = staging / "sumo-run"
-        place.mkdir()
-        prepared.sumo.write(place)
-        table = table_from_json(on.file("lane_table").read_bytes())
-        live = InStep(plan, ElevationLookup(on.graph, table), steps.append)
-        return simulate(prepared.sumo, place, reporter=reporter, live=live)
-
     def _follow_child(
         self,
         job: Path,
         folder: Path,
-        shown: _ShownRun,
+        shown: _ShownInMetaDrive,
         reporter: Reporter,
         prepared: MetaDriveRun,
     ) -> tuple[str | None, bool]:
@@ -286,7 +263,7 @@ class MetaDrive(Simulator[MetaDriveRun]):
         ):
             try:
                 for line in _lines_of(child, reporter, end):
-                    shown.take(json.loads(line))
+                    shown.take_line(json.loads(line))
                     reporter.advanced(shown.progress())
             except TimeoutError as error:
                 child.kill()
@@ -338,94 +315,29 @@ def _lanes_of(on: RunMap) -> Any:
     return map_elements(odr, on.graph.lanes).lanes
 
 
-class _ShownRun:
-    """What MetaDrive shows, as records of a run and beside what SUMO had."""
+class _ShownInMetaDrive(ShownRun):
+    """What MetaDrive shows, on the ground that its own is flat for."""
 
-    def __init__(self, prepared: MetaDriveRun, tracks: SumoTracks, drives: list[str]) -> None:
-        self._prepared, self._tracks, self._drives = prepared, tracks, drives
-        self._plan: Plan = prepared.plan
-        self._record = PositionRecord(prepared)
+    def __init__(self, prepared: MetaDriveRun, tracks: SumoTracks) -> None:
+        super().__init__(prepared, prepared.on, tracks, MetaDrive.label)
         self._heights = _Heights(tracks)
-        self._rows: list[np.ndarray] = []
-        self._touched: Counter[tuple[int, int]] = Counter()
-        self._touching: dict[tuple[int, int], float] = {}
         self._off_road: Counter[int] = Counter()
-        self._seen: set[int] = set()
-        self._here: list[int] = []
-        self.steps = 0
-        self._time = 0.0
 
-    def take(self, line: dict[str, Any]) -> None:
+    def take_line(self, line: dict[str, Any]) -> None:
         """Take one step down."""
-        step, plan = line["step"], self._plan
-        self._time = round(step * plan.step_length, 6)
-        positions, states = [], []
-        for row, x, y, hdg, speed in line["users"]:
-            z = self._heights.at(row, x, y)
-            positions.append(Position(plan.actors[row].id, x, y, hdg, speed, z))
-            states.append((self._time, row, x, y, z, hdg))
-        self._record.add(self._time, positions)
-        self._rows.append(np.array(states, dtype=np.float64).reshape(-1, 6))
-        self._take_contacts({row: (x, y) for row, x, y, *_ in line["users"]}, line["contacts"])
+        time = round(line["step"] * self._plan.step_length, 6)
+        users = [
+            ShownUser(row, x, y, self._heights.at(row, x, y), hdg, speed)
+            for row, x, y, hdg, speed in line["users"]
+        ]
+        self.take(time, users, line["contacts"])
         self._off_road.update(line["off_road"])
-        self._here = [row for row, *_ in line["users"]]
-        self._seen.update(self._here)
-        self.steps += 1
-
-    def _take_contacts(
-        self, places: dict[int, tuple[float, float]], contacts: list[list[int]]
-    ) -> None:
-        """Record each contact when it begins; between those who are still there."""
-        now = {(min(pair), max(pair)) for pair in contacts}
-        for row, other in sorted(now):
-            self._touched[row, other] += 1
-            last = self._touching.get((row, other), -math.inf)
-            self._touching[row, other] = self._time
-            if self._time - last < APART or not {row, other} <= places.keys():
-                continue
-            x, y = np.mean([places[row], places[other]], axis=0).tolist()
-            names = self._plan.actors[row].id, self._plan.actors[other].id
-            self._record.collide(self._time, *names, x, y)
-
-    def progress(self) -> Progress:
-        """How far MetaDrive is."""
-        running = len(self._here)
-        arrived = len(self._seen) - running
-        planned = len(self._plan.actors)
-        return Progress(self._time, self._plan.until, running, len(self._seen), arrived, planned)
-
-    def write(self, folder: Path) -> SimulationOutcome:
-        """Write the records, and how far both simulators agree."""
-        import polars as pl
-
-        outcome = self._record.write(folder)
-        tracks = self._tracks
-        sumo = pl.DataFrame(
-            {"time": tracks.when.round(6), "row": tracks.row}
-            | {name: getattr(tracks, name) for name in ("x", "y", "z", "hdg")}
-        )
-        columns = ("time", "row", "carla_x", "carla_y", "carla_z", "carla_hdg")
-        shown = pl.DataFrame(
-            np.concatenate([np.empty((0, 6)), *self._rows]), schema=columns, orient="row"
-        ).with_columns(pl.col("row").cast(pl.Int64))
-        states = sumo.join(shown, on=["time", "row"], how="left", maintain_order="left")
-        states = states.with_columns(pl.col(columns[2:]).fill_null(float("nan")))
-        drawing = MapDrawing.from_json(self._prepared.on.file("drawing").read_bytes())
-        write_parity(
-            folder, states.select(PARITY_STATES), None, self._plan, drawing, shown_by="MetaDrive"
-        )
-        return outcome
 
     def notes(self) -> list[str]:
         """What physics did that SUMO's run did not: contacts, and driving beside the lanes."""
-        plan, step = self._plan, self._plan.step_length
-        words = []
-        for (row, other), count in sorted(self._touched.items()):
-            name, partner = plan.actors[row].id, plan.actors[other].id
-            seconds = f"{count * step:.1f}"
-            words.append(f"{name} touched {partner} in MetaDrive for {seconds} s")
+        plan, words = self._plan, super().notes()
         for row, count in sorted(self._off_road.items()):
-            name, seconds = plan.actors[row].id, f"{count * step:.1f}"
+            name, seconds = plan.actors[row].id, f"{count * plan.step_length:.1f}"
             words.append(f"{name} was beside the lanes in MetaDrive for {seconds} s")
         return words
 

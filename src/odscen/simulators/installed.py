@@ -20,12 +20,14 @@ if TYPE_CHECKING:
 
 GROUP = "odscen.simulators"
 """Of entry points."""
-SUMO, CARLA_MIRROR, CARLA_NATIVE, METADRIVE = "sumo", "carla-mirror", "carla-native", "metadrive"
+SUMO, CARLA_MIRROR, CARLA_NATIVE = "sumo", "carla-mirror", "carla-native"
+METADRIVE, ESMINI = "metadrive", "esmini"
 _SHIPPED = {
     SUMO: "odscen.sumo.runner.sumo_simulator:SumoSimulator",
     CARLA_MIRROR: "odscen.carla.mirror.cosim:CarlaMirror",
     CARLA_NATIVE: "odscen.carla.native.native_run:CarlaNative",
     METADRIVE: "odscen.metadrive.metadrive_run:MetaDrive",
+    ESMINI: "odscen.esmini.esmini_run:Esmini",
 }
 """Named and not imported: each lies above this room."""
 _NO_OPTIONS: Mapping[str, OptionValue] = MappingProxyType({})

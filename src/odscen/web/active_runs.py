@@ -24,7 +24,14 @@ from odscen.runs.reporter import Reporter
 from odscen.runs.run_settings import RunSettings
 from odscen.runs.run_status import read_status
 from odscen.scenario.document.json_form import dumps
-from odscen.simulators.installed import CARLA_MIRROR, CARLA_NATIVE, METADRIVE, SUMO, open_simulator
+from odscen.simulators.installed import (
+    CARLA_MIRROR,
+    CARLA_NATIVE,
+    ESMINI,
+    METADRIVE,
+    SUMO,
+    open_simulator,
+)
 from odscen.sumo.runner.live_run import Live
 from odscen.sumo.runner.run_folder import SumoPreparedRun
 from odscen.sumo.runner.sumo_simulator import SumoSimulator
@@ -424,6 +431,9 @@ class Runs:
             if name == METADRIVE and "python" in options:
                 words = "the Python that has MetaDrive is chosen where this server is started"
                 raise InputError(words, element="python")
+            if name == ESMINI and "program" in options:
+                words = "the program of esmini is chosen where this server is started"
+                raise InputError(words, element="program")
             open_simulator(name, options, installed_only=True)
         return RunSettings(
             seed=wish.seed,

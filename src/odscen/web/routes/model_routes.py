@@ -12,6 +12,7 @@ from odscen.app.running.runs import run_map, unsupported_parts
 from odscen.simulators.installed import (
     CARLA_MIRROR,
     CARLA_NATIVE,
+    ESMINI,
     METADRIVE,
     installed_simulators,
     open_simulator,
@@ -21,7 +22,7 @@ from odscen.web.messages import Name, OfferedInfo, ProblemInfo
 from odscen.web.services import Shared
 
 router = APIRouter(prefix="/api")
-_OF_THE_SERVER = frozenset({"address", "python"})
+_OF_THE_SERVER = frozenset({"address", "program", "python"})
 """Options that whoever starts the server decides."""
 
 
@@ -47,7 +48,7 @@ def list_simulators() -> list[OfferedInfo]:
     rows = []
     for offered in installed_simulators():
         kept = tuple(option for option in offered.options if option.name not in _OF_THE_SERVER)
-        shipped = offered.name in (CARLA_MIRROR, CARLA_NATIVE, METADRIVE)
+        shipped = offered.name in (CARLA_MIRROR, CARLA_NATIVE, METADRIVE, ESMINI)
         rows.append(OfferedInfo.of(offered._replace(options=kept) if shipped else offered))
     return rows
 

@@ -1,0 +1,1 @@
+"""Exports played by the program esmini, which the user has."""

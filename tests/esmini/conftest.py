@@ -1,0 +1,3 @@
+from tests.app.conftest import sampled, workspace
+
+__all__ = ["sampled", "workspace"]
