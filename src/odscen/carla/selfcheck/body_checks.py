@@ -149,7 +149,7 @@ class BodyChecks:
 
     def lifts(self) -> list[CheckLine]:
         """How high above the ground bodies must be made."""
-        shape = self._shapes[self._walker]
+        shape = self._find_shape(self._walker)
         middle = shape.extent[2] - shape.centre[2]
         return [
             self._lift_line(CAR_LIFT, self._car, self._car_at, 0.0),
@@ -276,7 +276,7 @@ class BodyChecks:
         )
 
     def _spawn_body(self, blueprint: str, at: ActorPlace, *, walks: bool) -> int:
-        shape = self._shapes[blueprint]
+        shape = self._find_shape(blueprint)
         lift = LIFTS[0] + (shape.extent[2] - shape.centre[2] if walks else 0.0)
         spawn = Spawn(blueprint, _NAME, at, _STILL, 0.0, walks, lift, 0)
         (answer,) = self.server.apply(Batch(spawn=(spawn,)))
@@ -285,6 +285,12 @@ class BodyChecks:
                 f"the server refused {blueprint} {lift:g} m above the ground: {answer}"
             )
         return answer
+
+    def _find_shape(self, blueprint: str) -> Shape:
+        shape = self._shapes.get(blueprint)
+        if shape is None:
+            raise CarlaError(f"the server refused {blueprint} where nothing is, to be measured")
+        return shape
 
     def _move_forward(self, actor: int) -> ActorPlace:
         """Put a car forward in two ticks; where it is to be then."""
