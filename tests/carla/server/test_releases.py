@@ -67,6 +67,29 @@ def test_what_is_ground_is_known_by_its_label_where_labels_are_known() -> None:
     assert release_of("0.10.0").is_ground("Car")
 
 
+def test_a_step_that_was_never_set_is_not_read() -> None:
+    """Which ends the process of some packages (0.9.15), and raises in others (0.10.0)."""
+
+    class Settings:
+        def __init__(self) -> None:
+            self.synchronous_mode = False
+            self._delta: float | None = None
+
+        def __eq__(self, other: object) -> bool:
+            return isinstance(other, Settings) and vars(self) == vars(other)
+
+        @property
+        def fixed_delta_seconds(self) -> float:
+            assert self._delta is not None, "bad optional access"
+            return self._delta
+
+    settings = Settings()
+    settings.synchronous_mode = True
+    assert release_of("0.10.0").fixed_delta(settings) is None
+    settings._delta = 0.05
+    assert release_of("0.10.0").fixed_delta(settings) == 0.05
+
+
 @pytest.mark.parametrize(("read", "meant"), [(None, None), (4.7e-310, None), (0.05, 0.05)])
 def test_a_number_that_was_never_set_is_no_step(read: float | None, meant: float | None) -> None:
     settings = SimpleNamespace(fixed_delta_seconds=read)

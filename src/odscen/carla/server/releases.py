@@ -57,6 +57,14 @@ class ReleaseAdapter:
 
     def fixed_delta(self, settings: Any) -> float | None:
         """Seconds of a tick in a server's settings; ``None`` where time is not in fixed steps."""
+        # Reading one that is not set gives any number, raises, or ends the process, by release and
+        # by how the package was built; comparing does none of these.
+        unset = type(settings)()
+        for name in dir(settings):
+            if not name.startswith("_") and name != "fixed_delta_seconds":
+                setattr(unset, name, getattr(settings, name))
+        if settings == unset:
+            return None
         delta = settings.fixed_delta_seconds
         return float(delta) if delta and delta >= _UNSET_DELTA else None
 
