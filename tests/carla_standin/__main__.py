@@ -15,6 +15,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from tests.carla_standin import wire
 from tests.carla_standin.actor_calls import ActorCalls
 from tests.carla_standin.commands import BatchCalls
 from tests.carla_standin.light_calls import LightCalls
@@ -31,6 +32,7 @@ class StandIn:
     """Everything in the process, and what tests may ask of it behind CARLA's back."""
 
     def __init__(self, options: dict[str, Any]) -> None:
+        wire.speak(options["speaks"])
         maps = {name: Path(file) for name, file in options["maps"].items()}
         self.streams = StreamServer()
         self.switches = Switches()

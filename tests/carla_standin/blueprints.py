@@ -7,11 +7,12 @@ from typing import Any
 
 from odscen.base.categories import Category
 from odscen.simulators.assets import Blueprint, shipped_assets
+from tests.carla_standin import wire
 
 CAMERA, LIDAR, RADAR = "sensor.camera.rgb", "sensor.lidar.ray_cast", "sensor.other.radar"
 WALKER_CONTROLLER = "controller.ai.walker"
 
-_BOOL, _INT, _FLOAT, _STRING, _COLOR = 1, 2, 3, 4, 5
+_BOOL, _INT, _FLOAT, _STRING, _COLOR = range(5)
 _TWO_WHEELED = {Category.MOTORCYCLE, Category.BICYCLE}
 _TAGS = {
     Category.CAR: 14,
@@ -39,7 +40,8 @@ class Attribute:
     def wire(self) -> list[Any]:
         """ActorAttribute."""
         recommended = list(self.recommended)
-        return [self.id, self.type, self.value, recommended, self.modifiable, False]
+        kind = wire.attribute_type(self.type)
+        return [self.id, kind, self.value, recommended, self.modifiable, False]
 
 
 @dataclass(frozen=True, slots=True)

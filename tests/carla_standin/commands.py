@@ -1,4 +1,4 @@
-"""Batches: the commands of 0.9.16 by index, which differs from other releases."""
+"""Batches: the commands by index."""
 
 from __future__ import annotations
 
@@ -79,10 +79,9 @@ class BatchCalls:
         description: list[Any],
         at: list[Any],
         parent: list[Any],
-        _attachment: int,
-        _socket: str,
-        do_after: list[Any],
+        *more: Any,
     ) -> int:
+        do_after = more[-1]  # since 0.9.16 behind the kind of attachment and a socket
         if parent[0]:
             actor = self._actors.spawn_with_parent(description, at, parent[1])
         else:

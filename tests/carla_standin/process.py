@@ -1,4 +1,4 @@
-"""A stand-in for a CARLA 0.9.16 server, in a process of its own, for tests."""
+"""A stand-in for a CARLA server, in a process of its own, for tests."""
 
 from __future__ import annotations
 
@@ -12,8 +12,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from tests.carla_standin import wire
+
 _ROOT = Path(__file__).parents[2]
 _END_SECONDS = 10.0
+USUAL = os.environ.get("ODSCEN_STANDIN_RELEASE", wire.CLIENT_VERSION)
+"""Release of the client that tests have."""
 
 
 class StandIn:
@@ -30,6 +34,10 @@ class StandIn:
     box_offset
         Metres by which the boxes of vehicles lie before their origin, and to the right of it; some
         models have that.
+    speaks
+        Release whose wire it speaks, one of :data:`tests.carla_standin.wire.SPOKEN`, and which it
+        says that it is unless the switch ``version`` is given; usually that of
+        ``ODSCEN_STANDIN_RELEASE``, so that all tests can be run with the client of another.
     switches
         Of :class:`tests.carla_standin.switches.Switches`.
     """
@@ -44,13 +52,15 @@ class StandIn:
         map_name: str | None = None,
         other_maps: dict[str, Path] | None = None,
         box_offset: tuple[float, float] = (0.0, 0.0),
+        speaks: str = USUAL,
         **switches: Any,
     ) -> None:
         maps = {map_name or xodr.stem: xodr, **(other_maps or {})}
-        self._options = {
+        self._options: dict[str, Any] = {
             "maps": {name: str(file.resolve()) for name, file in maps.items()},
             "box_offset": box_offset,
-            "switches": switches,
+            "speaks": speaks,
+            "switches": {"version": speaks, **switches},
         }
         self.port = 0
 
@@ -170,7 +180,7 @@ class Replay(StandIn):
     module = "tests.carla_standin.replay"
 
     def __init__(self, transcript: Path, *, tolerance: float = 1e-4) -> None:
-        self._options = {"file": str(transcript.resolve()), "tolerance": tolerance}
+        self._options: dict[str, Any] = {"file": str(transcript.resolve()), "tolerance": tolerance}
         self.port = 0
 
     def outcome(self) -> dict[str, Any]:

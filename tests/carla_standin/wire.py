@@ -1,4 +1,4 @@
-"""What goes over the wire: answers, tokens and state messages of a CARLA 0.9.16 server.
+"""What goes over the wire: answers, tokens and state messages of a CARLA server.
 
 Metres, degrees, m/s, deg/s, seconds; x forward, y right, z up; rotations are pitch, yaw, roll. RPC
 structs are msgpack arrays, streams are packed little-endian.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any, Final
 
 CLIENT_VERSION: Final = "0.9.16"
@@ -25,7 +26,7 @@ _ACTOR = struct.Struct("<IB15f")
 _IMAGE = struct.Struct("<IIf")
 RADAR, LIDAR = 9, 11
 """Types of sensors, as in the header of their messages."""
-_SENSOR_RGB_CAMERA, _SENSOR_WORLD_OBSERVER = 13, 17
+_SENSOR_RGB_CAMERA = 13
 _ACTIVE, _DORMANT = 1, 2
 
 VEHICLE_TAIL: Final = struct.Struct("<3f3?ifB?IB")
@@ -38,6 +39,41 @@ Pose = tuple[float, float, float, float, float, float]
 """x, y, z, pitch, yaw, roll."""
 
 ZERO: Final[Vector] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SpokenRelease:
+    """What of the wire is another in another release, as their clients were seen to take it.
+
+    Attributes
+    ----------
+    world_observer
+        Type of state messages among sensors.
+    first_attribute
+        Number of the first type of attributes, that of switches.
+    """
+
+    world_observer: int
+    first_attribute: int
+
+
+SPOKEN: Final = {
+    "0.9.15": SpokenRelease(16, 0),
+    CLIENT_VERSION: SpokenRelease(17, 1),
+    "0.10.0": SpokenRelease(16, 0),
+}
+_spoken = SPOKEN[CLIENT_VERSION]
+
+
+def speak(release: str) -> None:
+    """Speak as servers of a release do, in the whole process."""
+    global _spoken  # noqa: PLW0603
+    _spoken = SPOKEN[release]
+
+
+def attribute_type(place: int) -> int:
+    """Number of a type of attributes: switch, whole number, number, text, colour from 0 on."""
+    return _spoken.first_attribute + place
 
 
 class RefusedError(Exception):
@@ -118,7 +154,7 @@ def state_message(
     """
     return b"".join(
         (
-            _HEADER.pack(_SENSOR_WORLD_OBSERVER, frame, elapsed, *ZERO, *ZERO),
+            _HEADER.pack(_spoken.world_observer, frame, elapsed, *ZERO, *ZERO),
             _EPISODE.pack(episode, platform_time, delta, 0, 0, 0, 0),
             *records,
         )

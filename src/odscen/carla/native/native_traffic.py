@@ -423,7 +423,7 @@ class Traffic:
         manager.auto_lane_change(car, False)
         manager.random_left_lanechange_percentage(car, 0)
         manager.random_right_lanechange_percentage(car, 0)
-        manager.keep_slow_lane_rule_percentage(car, 0)
+        self._server.release.stay_in_lane(manager, car)
         manager.update_vehicle_lights(car, True)
         manager.distance_to_leading_vehicle(car, plan.gap)
         if plan.offset:

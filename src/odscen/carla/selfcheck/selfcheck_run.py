@@ -272,6 +272,7 @@ def selfcheck(
         ]
         return report
     with answering(address):
+        report.versions["carla"] = str(server.client.get_client_version())
         report.versions["server"] = str(server.client.get_server_version())
     before = None
     with interrupts() as interrupted, server:

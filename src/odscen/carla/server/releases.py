@@ -45,6 +45,8 @@ class ReleaseAdapter:
         Whether places carry the label of what they are of. Otherwise whatever is below is taken.
     turns_wheels
         Whether the wheels of vehicles without physics can be steered and rolled.
+    slow_lane_rule
+        Name of the Traffic Manager's call for how often a vehicle changes to the slow lane.
     warning
         What a user should know of it, in words; empty if there is nothing.
     """
@@ -53,6 +55,7 @@ class ReleaseAdapter:
     generates_worlds: bool = True
     labels_ground: bool = True
     turns_wheels: bool = True
+    slow_lane_rule: str = "keep_slow_lane_rule_percentage"
     warning: str = ""
 
     def fixed_delta(self, settings: Any) -> float | None:
@@ -89,16 +92,25 @@ class ReleaseAdapter:
             wall_height=0.0, additional_width=0.0, smooth_junctions=False
         )
 
+    def stay_in_lane(self, manager: Any, car: Any) -> None:
+        """Let a Traffic Manager never change to the slow lane with a vehicle."""
+        getattr(manager, self.slow_lane_rule)(car, 0)
+
     def is_ground(self, label: object) -> bool:
         """Whether one may stand on what has a label of CARLA's."""
         return not self.labels_ground or str(label) in _GROUNDS
 
 
-_NEVER_TRIED = "CARLA {} was never tried, not even on a stand-in: {}"
-_AS_TRIED = "it is taken to be as 0.9.16"
+_NEVER_TRIED = "CARLA {} was never tried, not even on a stand-in: it is taken to be as 0.9.16"
+_BEFORE_SLOW_LANE = "keep_right_rule_percentage"
 
 RELEASES = (
-    ReleaseAdapter("0.9.15", turns_wheels=False, warning=_NEVER_TRIED.format("0.9.15", _AS_TRIED)),
+    ReleaseAdapter(
+        "0.9.15",
+        turns_wheels=False,
+        slow_lane_rule=_BEFORE_SLOW_LANE,
+        warning="CARLA 0.9.15 does not turn the wheels of vehicles that are shown",
+    ),
     ReleaseAdapter("0.9.16"),
     ReleaseAdapter(
         "0.10.0",
@@ -106,11 +118,10 @@ RELEASES = (
         # Semantic labels were made anew, and Town 10's road has potholes and speed bumps.
         labels_ground=False,
         turns_wheels=False,
-        warning=_NEVER_TRIED.format(
-            "0.10.0",
-            "it is said to have two maps and 13 models of vehicles, none on two wheels, other "
-            "physics, and roads that are less even than their OpenDRIVE file",
-        ),
+        slow_lane_rule=_BEFORE_SLOW_LANE,
+        warning="CARLA 0.10.0 makes no worlds of OpenDRIVE files and does not turn wheels; it is "
+        "said to have two maps and 13 models of vehicles, none on two wheels, other physics, and "
+        "roads that are less even than their OpenDRIVE file",
     ),
 )
 """Those of which something is known."""
@@ -131,4 +142,4 @@ def release_of(words: str) -> ReleaseAdapter:
     known = next((release for release in RELEASES if release.number == number), None)
     if known is not None:
         return known
-    return ReleaseAdapter(number, warning=_NEVER_TRIED.format(number, _AS_TRIED))
+    return ReleaseAdapter(number, warning=_NEVER_TRIED.format(number))
