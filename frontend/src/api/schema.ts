@@ -615,7 +615,7 @@ export interface paths {
     "/api/figures/actors": {
         /**
          * Actor Measures
-         * @description All measures of single actors, in the order in which they are offered.
+         * @description All measures of actors and rules, in the order in which they are offered.
          */
         get: operations["actor_measures_api_figures_actors_get"];
     };
@@ -931,12 +931,14 @@ export interface components {
              */
             driver: "sumo" | "story";
         };
-        /** @description What a criterion can ask of one actor. */
+        /** @description What a criterion can ask of one actor, of one and another (``pair``), or of a rule. */
         ActorMeasureInfo: {
             name: string;
             unit: string;
             label: string;
             definition: string;
+            /** @enum {string} */
+            about: "actor" | "pair" | "rule";
         };
         /**
          * @description What has become of an actor when the run ended.

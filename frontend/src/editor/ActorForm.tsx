@@ -124,6 +124,18 @@ export function ActorForm({
         </Group>
       )}
       {!walks && (
+        <Committed
+          label={t`Speed at departure`}
+          suffix={" km/h"}
+          min={0}
+          max={250}
+          digits={1}
+          placeholder={t`from rest`}
+          value={actor.initial_speed === null ? "" : actor.initial_speed * 3.6}
+          onCommit={(value) => change({ initial_speed: value === null ? null : value / 3.6 })}
+        />
+      )}
+      {!walks && (
         <Select
           label={t`Driven by`}
           description={

@@ -12,10 +12,10 @@ import { PartCard } from "./DemandParts";
 
 /** What must come out of a run for it to pass, as sentences. */
 export function CriteriaStep({
-  document: { actors, criteria },
+  document: { actors, rules, criteria },
   onEdit,
 }: {
-  document: Pick<ScenarioDocument, "actors" | "criteria">;
+  document: Pick<ScenarioDocument, "actors" | "rules" | "criteria">;
   onEdit: (edit: Edit, label?: string) => void;
 }) {
   const run = useLoaded(allFigures).value;
@@ -23,9 +23,9 @@ export function CriteriaStep({
   if (!run || !single) return <Loader size="sm" aria-label={t`Loading what can be measured`} />;
   const change = (next: readonly string[], label: string): void =>
     onEdit({ kind: "set_criteria", criteria: [...next] }, label);
-  const egos = actors.some(({ ego }) => ego);
+  const egos = actors.filter(({ ego }) => ego).map(({ id }) => id);
   const ids = [...actors].sort((one, other) => Number(other.ego) - Number(one.ego)).map(({ id }) => id);
-  const named = egos && !ids.includes(EGO) ? [EGO, ...ids] : ids;
+  const named = egos.length > 0 && !ids.includes(EGO) ? [EGO, ...ids] : ids;
   return (
     <>
       <Text size="sm">
@@ -56,6 +56,8 @@ export function CriteriaStep({
         run={run}
         single={single}
         ids={named}
+        egos={egos}
+        rules={rules.map(({ id }) => id)}
         criteria={criteria}
         onAdd={(text) => change([...criteria, text], t`Add a criterion`)}
       />
@@ -67,12 +69,17 @@ function NewCriterion({
   run,
   single,
   ids,
+  egos,
+  rules,
   criteria,
   onAdd,
 }: {
   run: readonly FigureInfo[];
   single: readonly ActorMeasureInfo[];
   ids: readonly string[];
+  /** Whom "ego" means, where no road user has this id. */
+  egos: readonly string[];
+  rules: readonly string[];
   criteria: readonly string[];
   onAdd: (text: string) => void;
 }) {
@@ -83,26 +90,42 @@ function NewCriterion({
     bound: 0,
     unit: "",
   });
-  const measures = made.actor === WHOLE_RUN ? run : single;
+  const [subject = "", other] = made.actor.split(",");
+  const offeredTo = (actor: string): readonly FigureInfo[] | readonly ActorMeasureInfo[] =>
+    actor === WHOLE_RUN
+      ? run
+      : single.filter(
+          ({ about }) => (about === "rule") === isRule(actor) && (about !== "pair" || ids.length > 1),
+        );
+  const isRule = (actor: string): boolean => !ids.includes(actor) && rules.includes(actor);
+  const measures = offeredTo(subject);
   const measure = measures.find(({ name }) => name === made.name);
   const unit = measure?.unit ?? "";
-  const about = (actor: string): void => {
-    const offered = actor === WHOLE_RUN ? run : single;
-    const kept = offered.some(({ name }) => name === made.name);
-    setMade({ ...made, actor, name: kept ? made.name : (offered[0]?.name ?? made.name) });
+  const others = ids.filter((id) => id !== subject && !(subject === EGO && egos.includes(id)));
+  const put = (actor: string, name: string): void => {
+    const offered = offeredTo(actor);
+    const chosen = offered.find((one) => one.name === name) ?? offered[0];
+    const pair = chosen !== undefined && "about" in chosen && chosen.about === "pair";
+    const rest = ids.filter((id) => id !== actor && !(actor === EGO && egos.includes(id)));
+    const to = other !== undefined && rest.includes(other) ? other : (rest[0] ?? "");
+    setMade({ ...made, actor: pair ? `${actor},${to}` : actor, name: chosen?.name ?? name });
   };
   const text = textOf({ ...made, unit: withUnit(unit) });
   return (
     <section className="fold" aria-label={t`New criterion`}>
       <Select
         label={t`About`}
-        data={[{ value: WHOLE_RUN, label: t`The whole run` }, ...ids.map((id) => ({ value: id, label: id }))]}
-        value={made.actor}
+        data={[
+          { value: WHOLE_RUN, label: t`The whole run` },
+          ...ids.map((id) => ({ value: id, label: id })),
+          ...rules.filter((id) => !ids.includes(id)).map((id) => ({ value: id, label: t`Rule ${id}` })),
+        ]}
+        value={subject}
         allowDeselect={false}
-        searchable={ids.length > 10}
+        searchable={ids.length + rules.length > 10}
         limit={50}
         onChange={(actor) => {
-          if (actor !== null) about(actor);
+          if (actor !== null) put(actor, made.name);
         }}
       />
       <Select
@@ -113,9 +136,21 @@ function NewCriterion({
         allowDeselect={false}
         searchable
         onChange={(name) => {
-          if (name !== null) setMade({ ...made, name });
+          if (name !== null) put(subject, name);
         }}
       />
+      {other !== undefined && (
+        <Select
+          label={t`Other road user`}
+          data={others}
+          value={other}
+          allowDeselect={false}
+          searchable={others.length > 10}
+          onChange={(to) => {
+            if (to !== null) setMade({ ...made, actor: `${subject},${to}` });
+          }}
+        />
+      )}
       <Select
         label={t`Is`}
         data={OPERATORS().map(([value, label]) => ({ value, label }))}

@@ -18,6 +18,9 @@ const PLAIN = localized((): Record<string, string> => ({
   "arrived == 1": t`reaches its goal`,
   "arrived >= 1": t`reaches its goal`,
   "collided == 0": t`does not collide`,
+  "stopped == 1": t`comes to a standstill`,
+  "fired == 1": t`fires`,
+  "fired == 0": t`does not fire`,
 }));
 /** Means every ego where no road user has this id. */
 export const EGO = "ego";
@@ -27,7 +30,7 @@ export const WHOLE_RUN = "";
 /** A criterion in parts: `name(actor) op bound unit`. */
 export interface Criterion {
   name: string;
-  /** Id of a road user, or "ego"; "" for the whole run. */
+  /** Id of a road user, or "ego"; of two with a comma; of a rule; "" for the whole run. */
   actor: string;
   op: string;
   bound: number;
@@ -65,8 +68,9 @@ export function criterionWords(
   if (!measure) return text;
   const plain = PLAIN()[`${parts.name} ${parts.op} ${parts.bound}`];
   if (parts.actor !== WHOLE_RUN && plain) return `${parts.actor} ${plain}`;
-  const about =
-    parts.actor === WHOLE_RUN ? served(measure.label) : t`${served(measure.label)} of ${parts.actor}`;
+  const [one = "", other] = parts.actor.split(",");
+  const whose = other === undefined ? one : t`${one} to ${other}`;
+  const about = parts.actor === WHOLE_RUN ? served(measure.label) : t`${served(measure.label)} of ${whose}`;
   const op = OPERATORS().find(([sign]) => sign === parts.op)?.[1] ?? parts.op;
   const unit = parts.unit || measure.unit;
   return `${sentence(about)}: ${op} ${parts.bound}${unit ? ` ${unit}` : ""}`;

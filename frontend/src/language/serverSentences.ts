@@ -595,6 +595,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "from the reference point, not the body" }),
   msg({ message: "from when an event sets {name}, as far as its trigger still holds" }),
   msg({ message: "from, s" }),
+  msg({ message: "gap when stopped" }),
   msg({ message: "generator" }),
   msg({ message: "geoReference {text} is not understood ({reason}); kept as text" }),
   msg({ message: "geoReference {text} names no projection; kept as text" }),

@@ -7,16 +7,21 @@ const MEASURES = {
   actors: [
     { name: "arrived", label: "goal reached", unit: "" },
     { name: "max_speed", label: "highest speed", unit: "m/s" },
+    { name: "stopped_before", label: "gap when stopped", unit: "m" },
+    { name: "fired", label: "firing", unit: "" },
   ],
 };
 
-test.each(["collided == 0", "arrived >= 95 %", "min_ttc(ego) >= 1.5 s", "max_speed(flow.3) <= 50 km/h"])(
-  "%s has parts that make the same text",
-  (text) => {
-    const parts = partsOf(text);
-    expect(parts && textOf(parts)).toBe(text);
-  },
-);
+test.each([
+  "collided == 0",
+  "arrived >= 95 %",
+  "min_ttc(ego) >= 1.5 s",
+  "max_speed(flow.3) <= 50 km/h",
+  "stopped_before(ego,child) >= 0.5 m",
+])("%s has parts that make the same text", (text) => {
+  const parts = partsOf(text);
+  expect(parts && textOf(parts)).toBe(text);
+});
 
 test("what is no criterion has no parts and is shown as it is", () => {
   expect(partsOf("usable")).toBeNull();
@@ -28,6 +33,8 @@ test("criteria are sentences with the unit they were written in, or that of the 
   const said = (text: string) => criterionWords(text, MEASURES);
   expect(said("arrived(ego) == 1")).toBe("ego reaches its goal");
   expect(said("max_speed(van) <= 50 km/h")).toBe("Highest speed of van: at most 50 km/h");
+  expect(said("stopped_before(ego,child) >= 0.5 m")).toBe("Gap when stopped of ego to child: at least 0.5 m");
+  expect(said("fired(cut-in) == 1")).toBe("cut-in fires");
   expect(said("mean_delay < 40")).toBe("Mean delay: less than 40 s");
 });
 

@@ -1,10 +1,12 @@
 import { expect, test } from "vitest";
 
-import { actionKind } from "../../src/editor/rules/actionKinds";
+import { actionKind, canDo } from "../../src/editor/rules/actionKinds";
 import {
+  actionsFor,
   type Draft,
   draftOf,
   missing,
+  newDraft,
   newItem,
   readPlace,
   type Rule,
@@ -175,4 +177,28 @@ test("where a rule acts is drawn: its trigger as a circle, its path from where t
     false,
     false,
   ]);
+});
+
+test("road users are offered what they can do, and a new rule begins with that", () => {
+  expect(["cut_in", "lane", "walk", "brake"].map((kind) => canDo(kind, true))).toEqual([
+    false,
+    false,
+    true,
+    true,
+  ]);
+  expect(["cut_in", "lane", "walk", "brake"].map((kind) => canDo(kind, false))).toEqual([
+    true,
+    true,
+    false,
+    true,
+  ]);
+  const walker = newDraft(["car-1", "pedestrian-1"], [], ["pedestrian-1"]);
+  expect([walker.actor, walker.when, walker.then[0]?.[0]?.kind]).toMatchObject([
+    "pedestrian-1",
+    { kind: "distance" },
+    "walk",
+  ]);
+  const van = newDraft(["car-1", "van-1"], []);
+  expect(actionsFor(van.then, true, ["car-1"])[0]?.[0]?.kind).toBe("walk");
+  expect(actionsFor(van.then, false, ["car-1"])).toEqual(van.then);
 });

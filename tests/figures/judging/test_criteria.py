@@ -96,6 +96,7 @@ def rows(*criteria: str, records: RunRecords = RECORDS) -> Sequence[dict[str, ob
         ("max_jerk(hero) <= 5", 7.0, False, 2.0),
         ("min_distance(hero,van) >= 3 m", 2.0, False, 2.0),
         ("min_distance(ego,bus) >= 3 m", None, False, None),
+        ("stopped_before(hero,van) >= 3 m", None, False, None),
         ("fired(cut-in) == 1", 1.0, True, 3.0),
         ("fired_at(cut-in) <= 2.5 s", 3.0, False, 3.0),
         ("fired(other) == 0", 0.0, True, None),
@@ -194,3 +195,32 @@ def test_only_conflicts_of_actors_need_criticality() -> None:
         name for name in ACTOR_NAMES if needs_criticality([parse_expectation(f"{name}(a) >= 0")])
     ]
     assert needing == ["min_ttc", "min_pet", "max_drac"]
+
+
+@pytest.mark.parametrize(
+    ("x", "speeds", "value", "time"),
+    [
+        # Fronts at 2 m and at 4 m; the other's near side is at x = 9 m.
+        ([0.0, 0.0, 2.0, 2.0], [0.0, 8.0, 0.05, 0.0], 5.0, 3.0),
+        ([0.0, 0.0, 2.0, 2.0], [8.0, 0.05, 8.0, 0.0], 5.0, 4.0),  # the nearer one of two stops
+        ([0.0, 4.0, 14.0, 20.0], [8.0, 8.0, 8.0, 0.0], None, None),  # when it is past the other
+        ([0.0, 4.0, 4.0, 4.0], [8.0, 8.0, 8.0, 8.0], None, None),
+        ([4.0, 4.0, 4.0, 4.0], [0.0, 0.0, 0.0, 0.0], None, None),  # never under way
+    ],
+)
+def test_the_gap_when_stopped_is_that_before_the_other_one(
+    x: list[float], speeds: list[float], value: float | None, time: float | None
+) -> None:
+    times = [1.0, 2.0, 3.0, 4.0]
+    shared = {"time": times, "y": [0.0] * 4, "hdg": [0.0] * 4, "width": [2.0] * 4}
+    bodies = {
+        "hero": pl.DataFrame(shared | {"x": x, "length": [4.0] * 4}),
+        "van": pl.DataFrame(shared | {"x": [11.0] * 4, "length": [4.0] * 4}),
+    }
+    records = RunRecords(
+        RECORDS.outcomes, EVENTS, None,
+        lambda _: pl.DataFrame({"time": times, "speed": speeds}), bodies.get,
+    )  # fmt: skip
+    (row,) = rows("stopped_before(ego,van) >= 4 m", records=records)
+    assert row["value"] == (None if value is None else pytest.approx(value))
+    assert (row["passed"], row["time"]) == (value is not None, time)

@@ -81,3 +81,12 @@ def test_random_streams_differ_by_their_names() -> None:
     draws = {tuple(stream(1, *names).integers(1000, size=4)) for names in ("a", "b", ("a", "b"))}
     assert len(draws) == 3
     assert np.array_equal(stream(5, "x").random(3), stream(5, "x").random(3))
+
+
+def test_whom_the_story_drives_without_a_goal_follows_its_lane_straight_on() -> None:
+    actors = tuple(
+        actor.model_copy(update={"driver": "story"}) for actor in scenario(*SPAWNS).actors
+    )
+    for seed in range(3):
+        one = scenario(*SPAWNS, seed=seed).model_copy(update={"actors": actors})
+        assert set(resolve_goals(one, GRAPH).values()) == {node_index(GRAPH, "2.0.-1.29")}

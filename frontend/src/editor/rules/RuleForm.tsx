@@ -7,7 +7,7 @@ import { useKeptForm } from "../../ui/keptForm";
 import { Committed } from "../Committed";
 import { CommittedText } from "../FormParts";
 import { WhenForm } from "./ConditionForm";
-import { type Draft, missing, sentence } from "./draft";
+import { actionsFor, type Draft, missing, sentence } from "./draft";
 import { type About, ChoiceInput } from "./FieldInput";
 import { ThenForm } from "./ThenForm";
 
@@ -20,6 +20,7 @@ export function RuleForm({
   saveLabel,
   actors,
   rules,
+  walkers,
   pick,
   onDraft,
   onSave,
@@ -27,6 +28,8 @@ export function RuleForm({
 }: About & {
   draft: Draft;
   saveLabel: string;
+  /** Of the actors those on foot. */
+  walkers: readonly string[];
   /** With every change, and null at the end: for the map. */
   onDraft: (draft: Draft | null) => void;
   onSave: (draft: Draft) => void;
@@ -41,6 +44,10 @@ export function RuleForm({
   const taken = rules.includes(draft.id.trim());
   const lacking = missing(draft);
   const about = { actors, rules, pick, others: actors.filter((one) => one !== draft.actor) };
+  const actBy = (actor: string): void => {
+    const others = actors.filter((one) => one !== actor);
+    put({ actor, then: actionsFor(draft.then, walkers.includes(actor), others) });
+  };
   return (
     <Stack gap={8}>
       <CommittedText label={t`Name`} value={draft.id} maxLength={60} onCommit={(id) => put({ id })} />
@@ -48,10 +55,15 @@ export function RuleForm({
         label={t`Who acts`}
         value={draft.actor}
         data={actors.map((one) => ({ value: one, label: one }))}
-        onChange={(actor) => put({ actor: actor ?? "" })}
+        onChange={(actor) => actBy(actor ?? "")}
       />
       <WhenForm condition={draft.when} onChange={(when) => put({ when })} {...about} />
-      <ThenForm then={draft.then} onChange={(then) => put({ then })} {...about} />
+      <ThenForm
+        then={draft.then}
+        onFoot={walkers.includes(draft.actor)}
+        onChange={(then) => put({ then })}
+        {...about}
+      />
       <Committed
         label={t`Fires at most`}
         suffix={draft.times === 1 ? t` time` : t` times`}

@@ -28,6 +28,7 @@ export function RulesStep({
   /** Id of the rule whose form is open, "" for a new one. */
   const [open, setOpen] = useKeptForm<string | null>("open rule", null);
   const ids = [...actors].sort((one, other) => Number(other.ego) - Number(one.ego)).map(({ id }) => id);
+  const walkers = actors.filter(({ category }) => category === "pedestrian").map(({ id }) => id);
   const turnTo = (id: string | null): void => {
     pick.stop();
     forgetForm(RULE_FORM);
@@ -44,6 +45,7 @@ export function RulesStep({
       draft={draft}
       saveLabel={saveLabel}
       actors={ids}
+      walkers={walkers}
       rules={rules.map(({ id }) => id).filter((id) => id !== open)}
       pick={pick}
       onDraft={onDraft}
@@ -82,7 +84,7 @@ export function RulesStep({
       })}
       {open === "" ? (
         <section className="fold" aria-label={t`New rule`}>
-          {form(newDraft(ids, rules), t`Add the rule`)}
+          {form(newDraft(ids, rules, walkers), t`Add the rule`)}
         </section>
       ) : (
         <Button disabled={ids.length === 0} onClick={() => opened("")}>

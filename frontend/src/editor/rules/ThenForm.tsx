@@ -3,24 +3,34 @@ import { Button, Group, Select } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { inSentence } from "../../ui/words";
-import { localized } from "../../language/localized";
 import { nth } from "../../lists";
 import { ListButtons } from "../FormParts";
-import { ACTION_KINDS, actionKind } from "./actionKinds";
-import { type Item, newItem, settled } from "./draft";
+import { ACTION_KINDS, actionKind, canDo } from "./actionKinds";
+import { firstAction, type Item, newItem, settled } from "./draft";
 import { type About, FieldInput } from "./FieldInput";
 
 type Then = readonly (readonly Item[])[];
 
-const KINDS = localized(() => Object.entries(ACTION_KINDS()).map(([value, { label }]) => ({ value, label })));
+/** What a road user can do, and what it is to do. */
+const kindsFor = (onFoot: boolean, chosen: string): { value: string; label: string }[] =>
+  Object.entries(ACTION_KINDS())
+    .filter(([value]) => canDo(value, onFoot) || value === chosen)
+    .map(([value, { label }]) => ({ value, label }));
 
 /** What the road user then does: actions in their order, of which each may be several at once. */
 export function ThenForm({
   then,
+  onFoot,
   onChange,
   ...about
-}: About & { others: readonly string[]; then: Then; onChange: (then: Then) => void }) {
-  const fresh = (): Item => newItem("brake", actionKind("brake"), about.others);
+}: About & {
+  others: readonly string[];
+  then: Then;
+  /** Whether the road user walks. */
+  onFoot: boolean;
+  onChange: (then: Then) => void;
+}) {
+  const fresh = (): Item => firstAction(onFoot, about.others);
   const put = (n: number, items: readonly Item[]): void =>
     onChange(
       items.length > 0 ? then.map((one, k) => (k === n ? items : one)) : then.filter((_, k) => k !== n),
@@ -41,6 +51,7 @@ export function ThenForm({
                 key={m}
                 label={items.length > 1 ? t`${label}, part ${m + 1}` : label}
                 item={item}
+                onFoot={onFoot}
                 onChange={(next) =>
                   put(
                     n,
@@ -92,12 +103,14 @@ export function ThenForm({
 function ActionForm({
   label,
   item,
+  onFoot,
   onChange,
   onRemove,
   ...about
 }: About & {
   others: readonly string[];
   label: string;
+  onFoot: boolean;
   item: Item;
   onChange: (item: Item) => void;
   onRemove?: () => void;
@@ -108,7 +121,7 @@ function ActionForm({
     <>
       <Select
         label={label}
-        data={KINDS()}
+        data={kindsFor(onFoot, item.kind)}
         value={item.kind}
         allowDeselect={false}
         onChange={(kind) => {

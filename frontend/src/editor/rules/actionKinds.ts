@@ -75,12 +75,14 @@ function pathWords(values: Values): string {
 export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   cut_in: {
     label: t`Cut in`,
+    only: "vehicles",
     fields: [TO(), OVER(), number("gap", t`Gap in the end`, " m", undefined, { min: 0.1 })],
     words: (v) =>
       t`cut in before ${text(v.to)} over ${amount(v.over, "s")}` + maybe(v.gap, t` with a gap of`, "m"),
   },
   lane: {
     label: t`Change lane`,
+    only: "vehicles",
     fields: [
       {
         is: "one",
@@ -139,6 +141,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   go: { label: t`Resume`, fields: [], words: () => t`resume its own speed` },
   offset: {
     label: t`Move within the lane`,
+    only: "vehicles",
     fields: [number("to", t`Left of the lane's centre`, " m", 0.5, { min: -10, max: 10, digits: 2 }), OVER()],
     words: (v) => {
       const far = amount(typeof v.to === "number" ? Math.abs(v.to) : v.to, "m");
@@ -150,6 +153,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   },
   keep_gap: {
     label: t`Keep a gap`,
+    only: "vehicles",
     fields: [
       TO(),
       {
@@ -174,6 +178,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   },
   walk: {
     label: t`Walk to`,
+    only: "pedestrians",
     fields: [
       place("to", t`Place`),
       { is: "points", name: "through", label: t`Through`, timed: false },
@@ -258,6 +263,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   },
   lights: {
     label: t`Set its lights`,
+    only: "vehicles",
     fields: [
       {
         is: "choice",
@@ -276,9 +282,10 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
     ],
     words: lightWords,
   },
-  horn: { label: t`Sound the horn`, fields: [], words: () => t`sound the horn` },
+  horn: { label: t`Sound the horn`, only: "vehicles", fields: [], words: () => t`sound the horn` },
   ignore: {
     label: t`Ignore traffic rules`,
+    only: "vehicles",
     fields: [
       { is: "flag", name: "red", label: t`Red lights`, otherwise: true },
       { is: "flag", name: "right_of_way", label: t`Right of way`, otherwise: false },
@@ -288,6 +295,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   release: { label: t`Release`, fields: [], words: () => t`drive as if there had been no rule` },
   drive: {
     label: t`Change its driver`,
+    only: "vehicles",
     fields: [{ is: "choice", name: "by", label: t`Driven by`, choices: DRIVERS() }],
     words: (v) => (v.by === "sumo" ? t`be driven by SUMO` : t`keep speed and lane, whatever is in the way`),
   },
@@ -300,3 +308,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
 
 export const actionKind = (kind: string): Kind | undefined =>
   (ACTION_KINDS() as Partial<Record<string, Kind>>)[kind];
+
+/** Whether a road user of a rule can do something: one on foot, or a vehicle. */
+export const canDo = (kind: string, onFoot: boolean): boolean =>
+  (actionKind(kind)?.only ?? (onFoot ? "pedestrians" : "vehicles")) === (onFoot ? "pedestrians" : "vehicles");

@@ -2,7 +2,7 @@ import { t } from "@lingui/core/macro";
 
 import { short } from "../../language/numbers";
 import type { EditOf, ScenarioDocument } from "../../api/types";
-import { actionKind } from "./actionKinds";
+import { actionKind, canDo } from "./actionKinds";
 import { conditionKind } from "./conditionKinds";
 import { type Field, given, type Kind, type PlainField, type Values } from "./fields";
 
@@ -217,19 +217,32 @@ export function readPlace(typed: string): string | [number, number] {
 export const placeText = (value: unknown): string =>
   Array.isArray(value) ? value.join(", ") : typeof value === "string" ? value : "";
 
-/** A road user that cuts in, for a begin: of those there are, the first that is not the ego. */
-export function newDraft(ids: readonly string[], rules: readonly Rule[]): Draft {
+/** The first action of a road user: what it does most. */
+export const firstAction = (onFoot: boolean, others: readonly string[]): Item => {
+  const kind = onFoot ? "walk" : "brake";
+  return newItem(kind, actionKind(kind), others);
+};
+
+/** Actions for another road user: what it cannot do becomes its first action. */
+export const actionsFor = (then: Draft["then"], onFoot: boolean, others: readonly string[]): Draft["then"] =>
+  then.map((items) => items.map((one) => (canDo(one.kind, onFoot) ? one : firstAction(onFoot, others))));
+
+/** A rule for a begin: of those there are, the first that is not the ego cuts in, or walks. */
+export function newDraft(
+  ids: readonly string[],
+  rules: readonly Rule[],
+  walkers: readonly string[] = [],
+): Draft {
   const actor = ids[1] ?? ids[0] ?? "";
   const others = ids.filter((id) => id !== actor);
+  const onFoot = walkers.includes(actor);
   const taken = new Set(rules.map(({ id }) => id));
   let number = 1;
   while (taken.has(`rule-${number}`)) number += 1;
-  const [condition, action] = others.length > 0 ? (["ttc", "cut_in"] as const) : (["time", "brake"] as const);
-  return {
-    id: `rule-${number}`,
-    actor,
-    when: newCondition(condition, others),
-    then: [[newItem(action, actionKind(action), others)]],
-    times: 1,
-  };
+  const condition = others.length === 0 ? "time" : onFoot ? "distance" : "ttc";
+  const action =
+    others.length > 0 && !onFoot
+      ? newItem("cut_in", actionKind("cut_in"), others)
+      : firstAction(onFoot, others);
+  return { id: `rule-${number}`, actor, when: newCondition(condition, others), then: [[action]], times: 1 };
 }

@@ -57,6 +57,8 @@ export type Field = (PlainField | OneOf) & {
 /** A kind of condition or action. */
 export interface Kind {
   label: string;
+  /** Who alone can do it. */
+  only?: "vehicles" | "pedestrians";
   fields: readonly Field[];
   words: (values: Values, actor: string) => string;
 }

@@ -231,6 +231,30 @@ def _shortest_distance(records: RunRecords, outcome: ActorOutcome, other: str) -
     return best if best.value < math.inf else None
 
 
+def _gap_when_stopped(records: RunRecords, outcome: ActorOutcome, other: str) -> Measured | None:
+    import polars as pl
+
+    from odscen.scenario.story.condition_kinds import body_distance
+
+    own, its, speeds = records.bodies(outcome.id), records.bodies(other), records.speeds(outcome.id)
+    if own is None or its is None or speeds is None:
+        return None
+    trace = speeds.sort("time")
+    moved = trace.filter(pl.col("speed") >= _STOPPED)
+    if moved.is_empty():
+        return None
+    stood = trace.filter((pl.col("speed") < _STOPPED) & (pl.col("time") > moved["time"][0]))
+    best: Measured | None = None
+    for one, two in _bodies_at_once(own.join(stood.select("time"), on="time"), its):
+        ahead = (two.x - one.x) * math.cos(one.hdg) + (two.y - one.y) * math.sin(one.hdg)
+        if ahead <= one.length / 2.0:  # it is past the other one's front, or beside it
+            continue
+        away = body_distance(one, two)
+        if best is None or away < best.value:
+            best = Measured(away, one.standing)
+    return best
+
+
 def _reach(body: ActorView) -> float:
     return math.hypot(body.length, body.width) / 2.0
 
@@ -448,6 +472,16 @@ PAIR_MEASURES = (
         source="trajectories",
         better=Better.HIGHER,
         compute=_shortest_distance,
+    ),
+    PairMeasure(
+        name="stopped_before",
+        unit="m",
+        label="gap when stopped",
+        definition="Least distance between the bodies while the actor, once under way, is below "
+        "0.1 m/s with the other one ahead of its front; not met if that never was so.",
+        source="trajectories",
+        better=Better.HIGHER,
+        compute=_gap_when_stopped,
     ),
 )
 RULE_MEASURES = (

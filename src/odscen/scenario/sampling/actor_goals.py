@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odscen.base.errors import ScenarioError
+from odscen.lanegraph.graphs import Relation
 from odscen.scenario.checks.actor_checks import (
     Subject,
     goal_problems,
@@ -30,7 +31,8 @@ def resolve_goals(
     """Goal of every actor as a node index: of the pedestrian graph for pedestrians, else of lanes.
 
     An open goal is drawn from the candidates of the spawn by the scenario's seed and the actor's
-    id, so that adding, removing or reordering other actors changes nothing.
+    id, so that adding, removing or reordering other actors changes nothing. Of a vehicle that the
+    story alone drives it is where its lane leads, straight on at forks: such a vehicle keeps it.
 
     Parameters
     ----------
@@ -63,9 +65,32 @@ def resolve_goals(
         problems += found
         if not found:
             candidates = region.candidates(place)
-            goals[actor.id] = int(stream(scenario.seed, "goal", actor.id).choice(candidates))
+            keeps = actor.driver == "story" and not actor.via and not place.walk
+            ahead = _lane_end(graph, place.node, candidates) if keeps else None
+            drawn = int(stream(scenario.seed, "goal", actor.id).choice(candidates))
+            goals[actor.id] = drawn if ahead is None else ahead
     refuse_errors(problems)
     return goals
+
+
+def _lane_end(graph: MapGraph, start: int, candidates: Int32Array) -> int | None:
+    """Last of some nodes that a lane leads to, straight on at forks; ``None`` if to none."""
+    lanes = graph.lanes
+    edges = np.flatnonzero(lanes.relation == Relation.SUCCESSOR)
+    edges = edges[np.argsort(lanes.source[edges], kind="stable")]
+    sources = lanes.source[edges]
+    wanted = set(candidates.tolist())
+    node, seen, found = start, {start}, None
+    while True:
+        first, last = np.searchsorted(sources, (node, node + 1))
+        onward = lanes.target[edges[first:last]]
+        if not len(onward):
+            return found
+        node = int(onward[np.argmax(np.cos(lanes.hdg[onward] - lanes.hdg[node]))])
+        if node in seen:
+            return found
+        seen.add(node)
+        found = node if node in wanted else found
 
 
 def flow_goals(

@@ -949,16 +949,16 @@ ACTIONS = {
         ),
         ActionKind(
             "arrive", "be `at` a place at the instant at which `to` is `when_at` another; the "
-            "speed is settled once that of `to` is steady; with `speed` it changes from its own to one "
-            "in between and from there to that, equally hard, and waits in between where it "
+            "speed is settled once that of `to` is steady; with `speed` it changes from its own to "
+            "one in between and from there to that, equally hard, and waits in between where it "
             "would be too early; `speed` is reached `steady` metres before the place", "m/s, m",
             "`setSpeed` or `person.moveToXY`", "SynchronizeAction", _MIRRORED, arrive,
             synchronise, end_of_arrival,
         ),
         ActionKind(
             "appear", "be on the road from now on, where it is placed or `at` x, y and heading of "
-            "its centre, with its initial or a given `speed`; before that it is not there; whom the story "
-            "drives is first seen a step later, where it has driven by then", "m/s",
+            "its centre, with its initial or a given `speed`; before that it is not there; whom "
+            "the story drives is first seen a step later, where it has driven by then", "m/s",
             "`add` on a whole step", "AddEntityAction", _MIRRORED, update=has_appeared,
             ask=ask_to_appear, says=lambda _: "appears",
         ),

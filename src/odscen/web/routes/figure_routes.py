@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Literal
+
 from fastapi import APIRouter
 
 from odscen.app.figure_functions import installed_figures
-from odscen.figures.judging.actor_measures import ACTOR_MEASURES
+from odscen.figures.judging.actor_measures import ACTOR_MEASURES, PAIR_MEASURES, RULE_MEASURES
 from odscen.figures.measures.figure import Better, SummaryPart
 from odscen.figures.measures.registry import RUN_FIGURES
 from odscen.web.messages import Answer
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from odscen.figures.judging.actor_measures import Measure
 
 router = APIRouter(prefix="/api/figures")
 
@@ -37,22 +44,33 @@ class FigureInfo(Answer):
 
 
 class ActorMeasureInfo(Answer):
-    """What a criterion can ask of one actor."""
+    """What a criterion can ask of one actor, of one and another (``pair``), or of a rule."""
 
     name: str
     unit: str
     label: str
     definition: str
+    about: Literal["actor", "pair", "rule"]
 
 
 @router.get("/actors")
 def actor_measures() -> list[ActorMeasureInfo]:
-    """All measures of single actors, in the order in which they are offered."""
+    """All measures of actors and rules, in the order in which they are offered."""
+    groups: tuple[tuple[Literal["actor", "pair", "rule"], Sequence[Measure]], ...] = (
+        ("actor", ACTOR_MEASURES),
+        ("pair", PAIR_MEASURES),
+        ("rule", RULE_MEASURES),
+    )
     return [
         ActorMeasureInfo(
-            name=measure.name, unit=measure.unit, label=measure.label, definition=measure.definition
+            name=measure.name,
+            unit=measure.unit,
+            label=measure.label,
+            definition=measure.definition,
+            about=about,
         )
-        for measure in ACTOR_MEASURES
+        for about, measures in groups
+        for measure in measures
     ]
 
 

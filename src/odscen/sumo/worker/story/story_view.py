@@ -175,7 +175,7 @@ class StoryView:
             return None
         there, here = beside(line, place), beside(line, (own.x, own.y))
         ahead = there.along - here.along
-        within = 0.0 < ahead and there.along < line_length(line) and abs(there.left) < _ABREAST
+        within = ahead > 0.0 and there.along < line_length(line) and abs(there.left) < _ABREAST
         return ahead if within else None
 
     def lane_line(self, actor: str, by: int) -> tuple[Point, ...] | None:
