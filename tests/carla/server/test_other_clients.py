@@ -1,7 +1,7 @@
 """Clients of other releases than the one that is installed, against a stand-in that speaks theirs.
 
 ``ODSCEN_CARLA_CLIENTS`` names a folder with one for each release, such as ``0.9.15``, into which
-its package was installed: ``pip install --no-deps --target 0.9.15 carla-0-9-15``. With the variables
+its package was installed: ``pip install --no-deps --target 0.9.15 carla-0-9-15``. With variables
 ``PYTHONPATH=FOLDER/0.9.15`` and ``ODSCEN_STANDIN_RELEASE=0.9.15`` all other tests are run with it.
 """
 

@@ -119,7 +119,8 @@ RELEASES = (
         labels_ground=False,
         turns_wheels=False,
         slow_lane_rule=_BEFORE_SLOW_LANE,
-        warning="CARLA 0.10.0 makes no worlds of OpenDRIVE files and does not turn wheels; it is "
+        warning="CARLA 0.10.0 makes no worlds of OpenDRIVE files and does not turn wheels; native "
+        "mode was never seen to work with it; it is "
         "said to have two maps and 13 models of vehicles, none on two wheels, other physics, and "
         "roads that are less even than their OpenDRIVE file",
     ),
