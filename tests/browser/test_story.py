@@ -80,14 +80,14 @@ def make_story(user: OdscenPage, name: str) -> None:
     here = node_near(user, 80.0, 7.9, walking=True)
     placed(user, hand, (("Car", ego), ("Van", van), ("Pedestrian", here)))
     for actor, kmh in (("car-1", "21.6"), ("van-1", "10.8")):
-        user.table.get_by_text(actor, exact=True).click()
+        open_actor(user, actor)
         for label in ("Desired speed", "Speed at departure"):
             page.get_by_label(label, exact=True).fill(kmh)
             with user.changing():
                 page.keyboard.press("Enter")
     with user.changing():
         user.choose("Driven by", "The story alone")  # the van, which is open: at just its speed
-    user.table.get_by_text("car-1", exact=True).click()  # straight on, in its lane
+    open_actor(user, "car-1")  # straight on, in its lane
     page.get_by_role("button", name="Choose on the map").click()
     with user.changing():
         user.map.click(user.graph.place(goal))
@@ -114,6 +114,12 @@ def make_story(user: OdscenPage, name: str) -> None:
     user.step("Criteria").click()
     add_criterion(user, hand, "collisions", "exactly", "0")
     add_criterion(user, hand, "gap when stopped", "at least", "0.5", other="pedestrian-1")
+
+
+def open_actor(user: OdscenPage, actor: str) -> None:
+    user.table.get_by_text(actor, exact=True).click()
+    form = user.page.get_by_role("region", name="Road users", exact=True)
+    expect(form.get_by_text(actor, exact=True)).to_be_visible()
 
 
 def begin_rule(user: OdscenPage, hand: Mouse, name: str, actor: str) -> None:
@@ -151,7 +157,6 @@ def run_on_page(user: OdscenPage, verdict: str) -> None:
 def varied(document: dict[str, Any], variation: Variation) -> Scenario:
     """The saved story with other numbers, as a program would change it."""
     data = json.loads(json.dumps(document))
-    data["simulation"]["duration"] = 14.0  # then the van waits where its lane ends
     data["actors"][0]["driver"] = "story" if variation.story else "sumo"
     rules = {rule["id"]: rule for rule in data["rules"]}
     rules["cross"]["when"]["distance"]["below"] = variation.crosses_at
@@ -189,7 +194,7 @@ def test_the_story_is_made_by_clicks_and_passes_or_fails_as_it_should(
     expect(user.result).to_contain_text("Met: Gap when stopped of ego to pedestrian-1")
     user.open_editor(NAME)
     user.step("Road users").click()
-    user.table.get_by_text("car-1", exact=True).click()
+    open_actor(user, "car-1")
     with user.changing():
         user.choose("Driven by", "The story alone")
     run_on_page(user, "not passed")

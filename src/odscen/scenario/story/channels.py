@@ -55,6 +55,8 @@ class WantedMove:
         What the driver does not heed.
     keeps_lane
         Whether it changes lanes only where its route needs it.
+    follows_lane
+        Whether it goes where its lane leads, if that is off its route and it is there.
     rejoins
         Whether a person is back on foot: SUMO leads it on to its goal.
     vanishes
@@ -71,6 +73,7 @@ class WantedMove:
     ignore_red: bool = False
     ignore_right_of_way: bool = False
     keeps_lane: bool = False
+    follows_lane: bool = False
     rejoins: bool = False
     vanishes: bool = False
     goal: str | None = None
@@ -268,6 +271,7 @@ class Channel:
             ignore_red=self.ignore_red,
             ignore_right_of_way=self.ignore_right_of_way,
             keeps_lane=self.keeps_lane or self.by_story,
+            follows_lane=self.by_story and pose is None,
             rejoins=self.rejoins,
             vanishes=self.vanishes,
             goal=self.goal,

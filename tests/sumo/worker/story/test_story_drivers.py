@@ -169,3 +169,24 @@ def test_who_overlaps_at_first_is_told_and_those_whom_the_story_drives_may(tmp_p
         if one.code == "bodies_overlap"
     ]
     assert refused.severity == "error"
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_who_is_in_a_lane_off_its_route_goes_on_along_it_at_its_speed(
+    tmp_path: Path, step: float
+) -> None:
+    """Its route turns left; a rule has put it on the lane for straight on, 20 m before the end."""
+    name = "signal_crossing"
+    van = {
+        "id": "ego", "category": "car", "spawn": node_at(name, 100.0, 0.0, hdg=math.pi),
+        "goal": node_at(name, -3.25, -140.0, hdg=-math.pi / 2), "initial_speed": 8.0,
+        "driver": "story", "ego": True,
+    }  # fmt: skip
+    rules = [after(2.0, {"lane": {"by": -1, "over": 1.5}})]
+    found = run(document(name, [van], rules, step=step, until=16.0), tmp_path / "run")
+    ego = found.tracks["ego"]
+    assert ego.speed == pytest.approx([8.0] * len(ego.speed), abs=0.05)
+    assert ego.x[ego.time > 14.0] == pytest.approx(
+        ego.x[0] - 8.0 * ego.time[ego.time > 14.0], abs=1.0
+    )
+    assert ego.y[ego.time > 14.0] == pytest.approx([3.25] * int((ego.time > 14.0).sum()), abs=0.1)

@@ -24,6 +24,12 @@ _FREE, _ON_FOOT = 2, 6
 _NOWHERE = 1e8
 _INSIDE = 0.1
 """Metres that a body has to be over a lane to be on it."""
+_NEAR_END = 2.0
+"""Metres before the end of a lane at which a vehicle goes on along it at the latest."""
+_ONWARD = 600.0
+"""Metres for which it is led on."""
+_TURNS = "srlt"
+"""Directions of links, the first of them first."""
 _RIGHT_OF_WAY, _RED = 8, 16
 """Bits of ``setSpeedMode``."""
 
@@ -243,6 +249,36 @@ class MovedActors:
         except self._errors:
             return False
         return edge in one.getRoute(vehicle)
+
+    def follow_lane(self, vehicle: str, *, within: float) -> None:
+        """Lead a vehicle on along its lane, straight on at forks, if its route leaves that.
+
+        Only so many metres before the end of the lane, where SUMO would stop it dead; until then
+        it may still change lanes. Its trip ends where that lane ends.
+        """
+        one, lanes = self._sumo.vehicle, self._sumo.lane
+        lane, route = one.getLaneID(vehicle), one.getRoute(vehicle)
+        row = one.getRouteIndex(vehicle)
+        if not lane or lane in self._lanes.internal or not 0 <= row < len(route) - 1:
+            return
+        if lanes.getLength(lane) - one.getLanePosition(vehicle) > within + _NEAR_END:
+            return
+        kind = one.getVehicleClass(vehicle)
+        onward = self._lanes.onwards(lane, kind)
+        leads_on = any(best[0] == lane and best[4] for best in one.getBestLanes(vehicle))
+        if not onward or leads_on:
+            return
+        edges = [lanes.getEdgeID(lane)]
+        metres = 0.0
+        while onward and metres < _ONWARD:
+            ways = {link[0]: _TURNS.find(link[6].lower()) for link in lanes.getLinks(lane)}
+            lane, edge = min(onward, key=lambda there: ways[there[0]] % len(_TURNS))
+            if edge in edges:
+                break
+            edges.append(edge)
+            metres += lanes.getLength(lane)
+            onward = self._lanes.onwards(lane, kind)
+        one.setRoute(vehicle, edges)
 
     def arrive(self, vehicle: str) -> None:
         """End the trip of a vehicle where it is."""

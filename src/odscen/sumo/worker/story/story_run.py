@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from odscen.sumo.worker.simulation.session import Session
 
 _FREE = WantedMove()
+_STEPS_AHEAD = 3.0
+"""Steps before the end of a lane at which it is said where a vehicle goes on."""
 _ANY_SPEED = 200.0
 """m/s."""
 _MORE = frozenset({"acceleration", "travelled", "off_road", "arrive", "own"})
@@ -263,6 +265,8 @@ class StoryRun:
         if move.keeps_lane != before.keeps_lane:
             road.keep_lane(name, keeps=move.keeps_lane)
         self._keep_goal(road, name, move)
+        if move.follows_lane:
+            road.follow_lane(name, within=_STEPS_AHEAD * (move.speed or 0.0) * self._step)
         if (pose := move.pose) is not None:
             x, y = pose.x + self._offset[0], pose.y + self._offset[1]
             road.put_vehicle(name, x, y, float(angle_deg_from_hdg(pose.hdg)))
