@@ -1,10 +1,10 @@
 """How what commands and routes take grows with the size of what they are given.
 
-``python -m bench sizes [--kinds KIND...] [--of check run routes edits import sweep]``: scenarios on
-the shipped crossing with 1, 2, 4 and 8 times as many parts of one kind
-(``bench/size_documents.py``), tables of as many rows, as many edits of one request, and grids of as
-many cases. CPU seconds of a command with all that it starts,
-and of the server while it answers a request; the exponent is that of the growth from the smallest
+``python -m bench sizes [--kinds KIND...] [--of check run routes edits import sweep received]``:
+scenarios on the shipped crossing with 1, 2, 4 and 8 times as many parts of one kind
+(``bench/size_documents.py``), tables of as many rows, as many edits of one request, grids of as
+many cases, and recordings, maps and histories of others (``bench/size_received.py``). CPU seconds
+of a command with all that it starts, and of the server while it answers a request; the exponent is that of the growth from the smallest
 to the largest, without what the same takes with the scenario itself. ``/api/health`` is asked for
 all the time while the server works, and is too slow if the server has computed that long.
 
@@ -26,11 +26,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import psutil
 
 from bench import size_documents as grown
+from bench import size_received as received
 from odscen.app.scenarios import SUFFIX, generate
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
@@ -111,7 +112,7 @@ def main() -> None:
     options.add_argument(
         "--of",
         nargs="+",
-        default=["check", "run", "routes", "edits", "import", "sweep"],
+        default=["check", "run", "routes", "edits", "import", "sweep", "received"],
         metavar="WHAT",
     )
     asked = options.parse_args()
@@ -141,6 +142,10 @@ def main() -> None:
                 content = tables(base, head, row)
                 work = [commands.import_table(base, table, content(n)) for n in sizes(ROWS)]
                 show(f"rows of a table: {table}", "`demand import`", ROWS, work)
+        if "received" in asked.of:
+            for kind, (command, write, number) in received.FILES.items():
+                work = [commands.receive(command, write(folder, n)) for n in sizes(number)]
+                show(kind, f"`{Commands.RECEIVING[command][0]}`", number, work)
         if "sweep" in asked.of:
             work = [commands.sweep(base, max(n, 2)) for n in sizes(CASES)]
             show("cases", "`sweep --dry-run`", CASES, work)
@@ -226,6 +231,22 @@ class Commands:
         table.write_text(content, encoding="utf-8")
         scenario = self._written(document)
         return self._command("demand", "import", scenario, f"--{kind}", table)
+
+    RECEIVING: ClassVar[dict[str, tuple[str, tuple[str, ...]]]] = {
+        "recording": (
+            "recording show --scenes",
+            ("--map", MAP, "--json", "--option", received.COLUMNS),
+        ),
+        "map": ("maps add", ("--name", "received")),
+        "history": ("history", ("--json",)),
+    }
+    """What reads a file of others: the command, and what is said beside the file."""
+
+    def receive(self, command: str, file: Path) -> Measured:
+        """Have a file read that others have written; a map is another one each time."""
+        words, more = self.RECEIVING[command]
+        first, *flags = words.split(" --")
+        return self._command(*first.split(), file, *(f"--{flag}" for flag in flags), *more)
 
     def sweep(self, document: grown.Document, cases: int) -> Measured:
         scenario = self._written(document)
