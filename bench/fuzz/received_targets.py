@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -98,7 +99,28 @@ def _double(data: bytes, rng: Generator) -> bytes:
 
 
 def _parquet_column(data: bytes, rng: Generator) -> bytes:
-    """A column of another type, an odd value in it, nothing in it, or the column gone."""
+    """A column of another type, an odd value in it, nothing in it, or the column gone.
+
+    Made in a process of its own: commands are forks of this one, and the threads that polars starts
+    where it is used first are in none of them, so that they would wait for them without end.
+    """
+    ours, theirs = os.pipe()
+    pid = os.fork()
+    if pid == 0:
+        os.close(ours)
+        try:
+            with os.fdopen(theirs, "wb") as pipe:
+                pipe.write(_damage_parquet_column(data, rng))
+        finally:
+            os._exit(0)
+    os.close(theirs)
+    with os.fdopen(ours, "rb") as pipe:
+        made = pipe.read()
+    os.waitpid(pid, 0)
+    return made
+
+
+def _damage_parquet_column(data: bytes, rng: Generator) -> bytes:
     import polars as pl
 
     try:

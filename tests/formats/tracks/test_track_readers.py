@@ -206,6 +206,38 @@ def test_a_wrong_naming_of_columns_is_said(columns: str, words: str, tmp_path: P
         read_recorded_traffic(file, columns=columns)
 
 
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (pl.lit(None).alias("position_x"), "x is None, not a finite number"),
+        (pl.lit(None).alias("track_id"), "it has no id"),
+        (pl.lit("a").alias("position_y"), "it is of type String, not a number"),
+        (pl.lit([1.0]).alias("heading"), r"it is of type List(Float64), not a number"),
+        (pl.lit(["a"]).alias("track_id"), r"it is of type List(String), not text or a number"),
+    ],
+)
+def test_columns_of_other_types_are_refused(changed: pl.Expr, words: str, tmp_path: Path) -> None:
+    table = pl.DataFrame({"track_id": ["1", "1"], "timestep": [0, 1], "object_category": [3, 3]})
+    zeros = ("position_x", "position_y", "heading", "velocity_x", "velocity_y")
+    table = table.with_columns(pl.lit("vehicle").alias("object_type"))
+    table = table.with_columns(pl.lit(0.0).alias(name) for name in zeros)
+    table.write_parquet(tmp_path / "good.parquet")
+    assert read_recorded_traffic(tmp_path / "good.parquet").rows.height == 2
+    table.with_columns(changed).write_parquet(tmp_path / "scene.parquet")
+    with pytest.raises(InputError, match=re.escape(words)):
+        read_recorded_traffic(tmp_path / "scene.parquet")
+
+
+def test_a_column_of_nothing_that_need_not_be_there_counts_as_missing(tmp_path: Path) -> None:
+    rows = {"id": ["1", "1"], "time": [0.0, 0.1], "x": [0.0, 1.0], "y": [0.0, 0.0]}
+    table = pl.DataFrame({**rows, "hdg": [0.0, 0.0], "speed": [10.0, 10.0]})
+    table = table.with_columns(pl.lit(None).alias("length"), pl.lit("car").alias("kind"))
+    table.write_parquet(tmp_path / "scene.parquet")
+    columns = {"columns": "time=time,id=id,x=x,y=y,hdg=hdg,length=length,kind=kind"}
+    found = read_recorded_traffic(tmp_path / "scene.parquet", **columns).rows
+    assert found["length"].to_list() == [None, None]
+
+
 def test_a_pickle_is_no_table_and_is_not_opened(tmp_path: Path) -> None:
     file = tmp_path / "scenario.pkl"
     file.write_bytes(b"\x80\x04cos\nsystem\n(S'touch pwned'\ntR.")

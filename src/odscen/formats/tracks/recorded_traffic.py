@@ -41,6 +41,8 @@ file calls it), ``x``, ``y`` (m, centre of the body, x east and y north or as th
 heading), ``length``, ``width`` (m, null if the file has none) and ``quality``: ``recorded``,
 ``after_gap`` (frames before it are missing) or ``fragment`` (the file doubts it)."""
 
+_WORDS: Final = frozenset({"id", "kind"})
+"""Columns of a file that may have text."""
 _MOST_ROWS = 100_000
 _FARTHEST: Final = {"time": 1e11, "x": 1e8, "y": 1e8}
 """Seconds (of any clock that began in the last 3,000 years) and metres beyond which nothing is."""
@@ -147,7 +149,7 @@ def complete_tracks(
     """
     if not given.height:
         raise InputError("no road user is in it at that time")
-    rows = given.sort("id", "time")
+    rows = _with_known_types(given).sort("id", "time")
     del given
     _refuse_numbers_that_are_none(rows)
     rows, repeated = _drop_repeated_rows(rows)
@@ -190,6 +192,18 @@ def complete_tracks(
     )
     rows = rows.select(pl.col(name).cast(kind) for name, kind in TRACK_COLUMNS.items())
     return RecordedTraffic(rows, schema, round(step, 6), signals, notes)
+
+
+def _with_known_types(rows: pl.DataFrame) -> pl.DataFrame:
+    """Columns of nothing as words or numbers; files with types of their own may have other ones."""
+    nothing = []
+    for name, kind in rows.schema.items():
+        if kind == pl.Null:
+            nothing.append(pl.col(name).cast(pl.String if name in _WORDS else pl.Float64))
+        elif kind.is_nested() or not (name in _WORDS or kind.is_numeric() or kind == pl.Boolean):
+            wanted = "text or a number" if name in _WORDS else "a number"
+            raise InputError(f"it is of type {kind}, not {wanted}", element=f"{name} of road users")
+    return rows.with_columns(nothing)
 
 
 def _refuse_numbers_that_are_none(rows: pl.DataFrame) -> None:
