@@ -213,6 +213,8 @@ def test_a_wrong_naming_of_columns_is_said(columns: str, words: str, tmp_path: P
         (pl.lit(None).alias("track_id"), "it has no id"),
         (pl.lit("a").alias("position_y"), "it is of type String, not a number"),
         (pl.lit([1.0]).alias("heading"), r"it is of type List(Float64), not a number"),
+        (pl.lit(b"a").alias("object_type"), "it is of type Binary, not text or a number"),
+        (pl.lit("a").alias("timestep"), "it cannot be read: division with 'String'"),
         (pl.lit(["a"]).alias("track_id"), r"it is of type List(String), not text or a number"),
     ],
 )
@@ -226,6 +228,39 @@ def test_columns_of_other_types_are_refused(changed: pl.Expr, words: str, tmp_pa
     table.with_columns(changed).write_parquet(tmp_path / "scene.parquet")
     with pytest.raises(InputError, match=re.escape(words)):
         read_recorded_traffic(tmp_path / "scene.parquet")
+
+
+@pytest.mark.parametrize("kind", [pl.Boolean, pl.Decimal(20, 2), pl.Int8, pl.Float32])
+def test_numbers_of_any_type_are_read(kind: pl.DataType, tmp_path: Path) -> None:
+    table = pl.DataFrame({"track_id": ["1", "1"], "timestep": [0, 1], "object_category": [3, 3]})
+    table = table.with_columns(pl.lit("vehicle").alias("object_type"))
+    ones = ("position_x", "position_y", "heading", "velocity_x", "velocity_y")
+    table.with_columns(pl.lit(1).cast(kind).alias(name) for name in ones).write_parquet(
+        tmp_path / "scene.parquet"
+    )
+    found = read_recorded_traffic(tmp_path / "scene.parquet").rows.row(0, named=True)
+    assert (found["x"], found["hdg"], found["speed"]) == (1.0, 1.0, pytest.approx(math.sqrt(2.0)))
+
+
+def test_a_message_on_many_names_is_short(tmp_path: Path) -> None:
+    rates = "id,frameRate,locationId\n" + "1,25,2\n" * 5000
+    file = write(
+        tmp_path, {**HIGHD, "01_recordingMeta.csv": rates, "01_tracks.csv": HIGHD["01_tracks.csv"]}
+    )
+    with pytest.raises(InputError, match=r"frameRate is 25\.0, 25\.0") as raised:
+        read_recorded_traffic(tmp_path / "01_tracks.csv")
+    assert len(str(raised.value)) < 500
+    names = ",".join(f"column{n}" for n in range(5000))
+    (tmp_path / "01_recordingMeta.csv").write_text(f"{names}\n", encoding="utf-8")
+    with pytest.raises(InputError, match="no column") as raised:
+        read_recorded_traffic(file)
+    assert len(str(raised.value)) < 500
+
+
+def test_an_offset_beyond_all_maps_is_refused(tmp_path: Path) -> None:
+    file = write(tmp_path, {"tracks.csv": "time,id,x,y\n0,a,0,0\n1,a,1,0\n"})
+    with pytest.raises(InputError, match="an offset is at most 1e"):
+        read_recorded_traffic(file, columns="time=time,id=id,x=x,y=y", offset="1e308,0")
 
 
 def test_a_column_of_nothing_that_need_not_be_there_counts_as_missing(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import InputError, in_file
-from odscen.formats.tracks.recorded_traffic import shift_tracks
+from odscen.formats.tracks.recorded_traffic import FARTHEST, shift_tracks
 from odscen.formats.tracks.table_schemas import TimeWindow, has_track_columns, read_track_table
 
 if TYPE_CHECKING:
@@ -129,6 +129,8 @@ def map_offset(text: str) -> tuple[float, float, float]:
     if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
         raise InputError(f"an offset is X,Y or X,Y,DEGREES, not {text!r}")
     x, y, turn = (*numbers, 0.0)[:3]
+    if max(abs(x), abs(y)) > FARTHEST["x"]:
+        raise InputError(f"an offset is at most {FARTHEST['x']:g} m, not {text!r}")
     return x, y, math.radians(turn)
 
 

@@ -44,7 +44,7 @@ heading), ``length``, ``width`` (m, null if the file has none) and ``quality``: 
 _WORDS: Final = frozenset({"id", "kind"})
 """Columns of a file that may have text."""
 _MOST_ROWS = 100_000
-_FARTHEST: Final = {"time": 1e11, "x": 1e8, "y": 1e8}
+FARTHEST: Final = {"time": 1e11, "x": 1e8, "y": 1e8}
 """Seconds (of any clock that began in the last 3,000 years) and metres beyond which nothing is."""
 _LARGEST_BODY = 1000.0
 _MOST_ANGLE = 1e6
@@ -195,22 +195,26 @@ def complete_tracks(
 
 
 def _with_known_types(rows: pl.DataFrame) -> pl.DataFrame:
-    """Columns of nothing as words or numbers; files with types of their own may have other ones."""
-    nothing = []
+    """Columns as words or numbers, whatever type they have in a file that has types of its own."""
+    made = []
     for name, kind in rows.schema.items():
-        if kind == pl.Null:
-            nothing.append(pl.col(name).cast(pl.String if name in _WORDS else pl.Float64))
-        elif kind.is_nested() or not (name in _WORDS or kind.is_numeric() or kind == pl.Boolean):
-            wanted = "text or a number" if name in _WORDS else "a number"
+        of_words = name in _WORDS
+        known = kind.is_numeric() or kind in (pl.Boolean, pl.Null)
+        if of_words and (known or kind in (pl.String, pl.Categorical, pl.Enum)):
+            made.append(pl.col(name).cast(pl.String))
+        elif known:
+            made.append(pl.col(name).cast(pl.Boolean if name == "fragment" else pl.Float64))
+        else:
+            wanted = "text or a number" if of_words else "a number"
             raise InputError(f"it is of type {kind}, not {wanted}", element=f"{name} of road users")
-    return rows.with_columns(nothing)
+    return rows.with_columns(made)
 
 
 def _refuse_numbers_that_are_none(rows: pl.DataFrame) -> None:
     nobody = rows.filter(pl.col("id").is_null())
     if nobody.height:
         raise InputError("it has no id", element=f"road user at {nobody['time'][0]} s")
-    for name, most in _FARTHEST.items():
+    for name, most in FARTHEST.items():
         # No comparison holds of what is no number.
         wrong = rows.filter(
             ~(pl.col(name).is_finite() & (pl.col(name).abs() <= most)).fill_null(value=False)

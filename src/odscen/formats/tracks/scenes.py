@@ -105,7 +105,8 @@ def exposure(rows: pl.DataFrame, scenes: pl.DataFrame) -> dict[str, Any]:
     )
     dx, dy = (pl.col(name).diff().over("id") for name in ("x", "y"))
     driven = vehicles.select((dx**2 + dy**2).sqrt().sum()).item() / 1000.0
-    hours = (float(rows["time"].max()) - float(rows["time"].min())) / 3600.0  # type: ignore[arg-type]
+    seconds = rows.select(pl.col("time").max() - pl.col("time").min()).item()
+    hours = (seconds or 0.0) / 3600.0  # no row is left of a recording of other things
     return {
         "hours": round(hours, 6),
         "vehicle_km": round(driven, 3),

@@ -160,14 +160,14 @@ def _scan_table(file: GivenFile, types: Types) -> pl.LazyFrame:
             return pl.scan_parquet(file.on_disk)
         return pl.scan_csv(file.on_disk, schema_overrides=types, infer_schema=False)
     except (pl.exceptions.PolarsError, ValueError, OSError) as error:
-        raise InputError(f"not a table: {error}", file=file.name) from error
+        raise InputError(f"not a table: {_what_is_said(error)}", file=file.name) from error
 
 
 def _columns_of(file: GivenFile) -> tuple[str, ...]:
     try:
         return tuple(_scan_table(file, {}).collect_schema().names())
     except (pl.exceptions.PolarsError, OSError) as error:
-        raise InputError(f"not a table: {error}", file=file.name) from error
+        raise InputError(f"not a table: {_what_is_said(error)}", file=file.name) from error
 
 
 def _collect_table(file: GivenFile, types: Types, table: pl.LazyFrame) -> pl.DataFrame:
@@ -176,7 +176,7 @@ def _collect_table(file: GivenFile, types: Types, table: pl.LazyFrame) -> pl.Dat
         return table.collect(engine="streaming")
     except (pl.exceptions.PolarsError, OSError) as error:
         _refuse_wrong_value(file, types)
-        raise InputError(f"it cannot be read: {error}", file=file.name) from error
+        raise InputError(f"it cannot be read: {_what_is_said(error)}", file=file.name) from error
 
 
 def _refuse_wrong_value(file: GivenFile, types: Types) -> None:
@@ -198,6 +198,11 @@ def _refuse_wrong_value(file: GivenFile, types: Types) -> None:
                 # The titles are line 1.
                 element=f"line {row + 2} > column {name}",
             )
+
+
+def _what_is_said(error: Exception) -> str:
+    """The first line of a message: what follows are hints for programmers, and the query."""
+    return str(error).partition("\n")[0]
 
 
 def _list_names(names: Sequence[object]) -> str:
@@ -399,7 +404,10 @@ def _read_levelx_files(
         _refuse_missing_columns(meta, types)
         rates = _collect_table(meta, types, _scan_table(meta, types))["frameRate"]
         if len(rates) != 1 or not rates[0] or not 0.0 < rates[0] < 1e4:
-            raise InputError(f"frameRate is {rates.to_list()}, not one number of frames in 1 s")
+            found = _list_names(rates.to_list())
+            raise InputError(
+                f"frameRate is {found or 'not there'}, not one number of frames in 1 s"
+            )
     users = given.beside("_tracks", "_tracksMeta")
     with in_file(users.name):
         types = {track: _I, **dict.fromkeys(more, _I)}
@@ -416,7 +424,7 @@ def _refuse_missing_columns(file: GivenFile, needed: Mapping[str, object]) -> No
     columns = _columns_of(file)
     missing = [name for name in needed if name not in columns]
     if missing:
-        raise InputError(f"no column {' and '.join(missing)}; there are {', '.join(columns)}")
+        raise InputError(f"no column {' and '.join(missing)}; there are {_list_names(columns)}")
 
 
 def _with_kind(rows: pl.DataFrame, given: TrackFile) -> pl.DataFrame:
