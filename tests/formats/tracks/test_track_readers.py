@@ -257,6 +257,26 @@ def test_a_message_on_many_names_is_short(tmp_path: Path) -> None:
     assert len(str(raised.value)) < 500
 
 
+def test_lights_of_one_frame_are_refused(tmp_path: Path) -> None:
+    head = "track_id,timestamp_ms,agent_type,x,y,vx,vy,ax,ay,yaw_rad,length,width\n"
+    write(tmp_path, {"Veh_smoothed_tracks.csv": f"{head}1,0,car,0,0,1,0,0,0,0,4,1.8\n"})
+    lights = {"Traffic_Lights.csv": "RawFrameID,timestamp(ms),light 1\n7,0,1\n7,1000,3\n"}
+    write(tmp_path, lights)
+    with pytest.raises(InputError, match="fewer than two frames have a time"):
+        read_recorded_traffic(tmp_path / "Veh_smoothed_tracks.csv")
+
+
+def test_a_file_beside_of_other_columns_is_named(tmp_path: Path) -> None:
+    head = "track_id,timestamp_ms,agent_type,x,y,vx,vy,ax,ay,yaw_rad,length,width\n"
+    write(tmp_path, {"Veh_smoothed_tracks.csv": f"{head}1,0,car,0,0,1,0,0,0,0,4,1.8\n"})
+    write(tmp_path, {"Ped_smoothed_tracks.csv": "a" * 3000 + "\n1\n"})
+    with pytest.raises(
+        InputError, match=r"Ped_smoothed_tracks\.csv: no column agent_type"
+    ) as raised:
+        read_recorded_traffic(tmp_path / "Veh_smoothed_tracks.csv")
+    assert len(str(raised.value)) < 500
+
+
 def test_an_offset_beyond_all_maps_is_refused(tmp_path: Path) -> None:
     file = write(tmp_path, {"tracks.csv": "time,id,x,y\n0,a,0,0\n1,a,1,0\n"})
     with pytest.raises(InputError, match="an offset is at most 1e"):

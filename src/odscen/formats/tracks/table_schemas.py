@@ -19,7 +19,7 @@ from odscen.formats.tracks.osi_trace import OSI_OBJECTS, OSI_VEHICLE, OSI_VEHICL
 from odscen.formats.tracks.recorded_traffic import RecordedTraffic, complete_tracks
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from odscen.formats.base import GivenFile
 
@@ -81,6 +81,7 @@ class TrackFile:
             table = table.filter(where)
         for expression in (*expressions, *(() if where is None else (where,))):
             self.used.update(expression.meta.root_names())
+        _refuse_missing_columns(self.file, self.used, self.columns)
         inside = pl.col("time").is_between(self.window.begin - _SAME, self.window.end + _SAME)
         inside |= ~pl.col("time").is_finite()  # a row of no time is refused later, and not lost
         return _collect_table(self.file, columns, table.select(expressions).filter(inside))
@@ -316,10 +317,13 @@ def _read_sind_lights(file: GivenFile) -> pl.DataFrame:
         rows = _collect_table(file, types, _scan_table(file, types))
         lights = [name for name in rows.columns if name not in types]
         if not types.keys() <= set(rows.columns) or not lights:
-            raise InputError(f"no column RawFrameID, timestamp(ms) or of a light: {rows.columns}")
+            named = _list_names(rows.columns)
+            raise InputError(
+                f"no column RawFrameID, timestamp(ms) or of a light; there are {named}"
+            )
         known = rows.drop_nulls("timestamp(ms)").sort("RawFrameID")
-        if known.height < 2:
-            raise InputError("fewer than two rows have a time", element="column timestamp(ms)")
+        if known["RawFrameID"].n_unique() < 2:
+            raise InputError("fewer than two frames have a time", element="column timestamp(ms)")
         first, last = known.row(0, named=True), known.row(-1, named=True)
         frames = last["RawFrameID"] - first["RawFrameID"]
         per_frame = (last["timestamp(ms)"] - first["timestamp(ms)"]) / frames
@@ -420,11 +424,15 @@ def _read_levelx_files(
     return float(rates[0]), kinds
 
 
-def _refuse_missing_columns(file: GivenFile, needed: Mapping[str, object]) -> None:
-    columns = _columns_of(file)
-    missing = [name for name in needed if name not in columns]
+def _refuse_missing_columns(
+    file: GivenFile, needed: Iterable[str], columns: Sequence[str] | None = None
+) -> None:
+    columns = _columns_of(file) if columns is None else columns
+    missing = sorted(set(needed) - set(columns))
     if missing:
-        raise InputError(f"no column {' and '.join(missing)}; there are {_list_names(columns)}")
+        raise InputError(
+            f"no column {' and '.join(missing)}; there are {_list_names(columns)}", file=file.name
+        )
 
 
 def _with_kind(rows: pl.DataFrame, given: TrackFile) -> pl.DataFrame:
