@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
+from numpy.lib.stride_tricks import sliding_window_view
 
 from odscen.base.ids import SumoEdgeId
 from odscen.convert.building.junction_ruling import (
@@ -86,8 +87,8 @@ def bent_aside(movement: Movement) -> float:
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))
     places = np.arange(0.0, along[-1], _STEP)
     xy = np.column_stack([np.interp(places, along, path[:, k]) for k in (0, 1)])
-    body = round(BUS_LENGTH / _STEP)
-    deepest = max(_arc_height(xy[n : n + body + 1]) for n in range(len(xy) - body))
+    body = round(BUS_LENGTH / _STEP) + 1
+    deepest = float(_arc_heights(np.moveaxis(sliding_window_view(xy, body, axis=0), 2, 1)).max())
     return deepest if deepest >= LEAST_BENT else 0.0
 
 
@@ -99,11 +100,13 @@ def _with_ends(path: FloatArray) -> FloatArray:
     return np.vstack([before, path, behind])
 
 
-def _arc_height(arc: FloatArray) -> float:
-    """Metres to which an arc ``(K, 2)`` leaves its chord."""
-    chord = arc[-1] - arc[0]
-    offset = arc - arc[0]
-    return float(np.abs(chord[0] * offset[:, 1] - chord[1] * offset[:, 0]).max() / np.hypot(*chord))
+def _arc_heights(arcs: FloatArray) -> FloatArray:
+    """Metres to which arcs ``(N, K, 2)`` leave their chords."""
+    chord = arcs[:, -1] - arcs[:, 0]
+    offset = arcs - arcs[:, :1]
+    aside = np.abs(chord[:, :1] * offset[..., 1] - chord[:, 1:] * offset[..., 0]).max(axis=1)
+    heights: FloatArray = aside / np.hypot(chord[:, 0], chord[:, 1])
+    return heights
 
 
 LEAST_ROOM = 4.0

@@ -26,6 +26,12 @@ _SPEEDS = np.array([0.0, 20.0, 40.0, 60.0, 80.0, 100.0, 130.0]) / 3.6
 _LATERAL = np.array([3.1, 3.1, 2.7, 2.4, 2.2, 2.0, 1.8])
 """m/s2 that the median driver chooses at these speeds, m/s."""
 
+_SLOPES = np.append(np.diff(_LATERAL) / np.diff(_SPEEDS), 0.0)
+"""By which it changes from each speed to the next, 1/s."""
+
+_FASTEST = 199.0
+"""m/s from which on a bend is none."""
+
 HEAVY = 0.65
 """Share of it that drivers of trucks and buses choose: loads shift and roll over, people stand."""
 
@@ -71,13 +77,14 @@ def comfortable_speed(curvature: FloatArray | float, *, share: float = 1.0) -> F
     -------
     The same shape; infinite where it is straight. ``v^2 |curvature| = a(v)``.
     """
-    bend = np.abs(np.asarray(curvature, dtype=np.float64))
-    low, high = np.zeros_like(bend), np.full_like(bend, 200.0)
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        fits = middle * middle * bend <= share * np.interp(middle, _SPEEDS, _LATERAL)
-        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    return np.where((low > 199.0) | (bend < _STRAIGHT), np.inf, np.maximum(low, LEAST_SPEED))
+    bend = np.abs(np.asarray(curvature, dtype=np.float64)) / share
+    # v^2 |curvature| - a(v) grows with v: its root is above the last speed at which it is below 0.
+    piece = (bend[..., None] * _SPEEDS[1:] ** 2 < _LATERAL[1:]).sum(axis=-1)
+    slope, first = _SLOPES[piece], _LATERAL[piece] - _SLOPES[piece] * _SPEEDS[piece]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        speed = (slope + np.sqrt(slope * slope + 4.0 * bend * first)) / (2.0 * bend)
+    straight = (speed > _FASTEST) | (bend * share < _STRAIGHT)
+    return np.where(straight, np.inf, np.maximum(speed, LEAST_SPEED))
 
 
 def sharpest_bend(shape: FloatArray) -> float:
