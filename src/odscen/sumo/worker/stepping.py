@@ -140,6 +140,7 @@ class Stepper:
         self._take_rules(session)
         if saved:
             session.turning_gaps.forget()
+            session.lateral_places.forget()
         self._busy += clock() - begin - waited
         self._finish_run(session, now, more=more)
         return now
@@ -163,8 +164,9 @@ class Stepper:
         if self.behaviour is not None:
             self.behaviour.before_step(session, self._moved_by_others())
         else:
-            gaps = session.turning_gaps
-            gaps.before_step(only=self._take_gaps, moved=self._moved_by_others())
+            moved = self._moved_by_others()
+            session.turning_gaps.before_step(only=self._take_gaps, moved=moved)
+            session.lateral_places.before_step(only=self._take_gaps, moved=moved)
         after = session.step()
         recorder.record(session, now)
         if self.story is not None or self._led is not None:

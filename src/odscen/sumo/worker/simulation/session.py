@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.base.errors import SimulationError
 from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
 from odscen.sumo.worker.simulation.foreign_traffic import ForeignLights, ForeignTraffic, is_foreign
+from odscen.sumo.worker.simulation.lateral_places import LateralPlaces
 from odscen.sumo.worker.simulation.libsumo_import import import_libsumo
 from odscen.sumo.worker.simulation.moved_actors import MovedActors
 from odscen.sumo.worker.simulation.observed import (
@@ -143,6 +144,12 @@ class Session:
         """Gaps that those take who turn across oncoming traffic."""
         native = partial(_native_function, self._sumo)
         return TurningGaps(self._sumo, self._errors, self.lanes, native)
+
+    @cached_property
+    def lateral_places(self) -> LateralPlaces:
+        """Where vehicles are beside the centres of their lanes."""
+        native = partial(_native_function, self._sumo)
+        return LateralPlaces(self._sumo, self._errors, self.lanes, native)
 
     @cached_property
     def place(self) -> Placing:

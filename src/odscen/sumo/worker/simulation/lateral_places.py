@@ -1,0 +1,182 @@
+"""Lateral positions that stay the same in metres where lanes are of other widths.
+
+Without the sublane model SUMO keeps a vehicle beside the centre of its lane by a share of the room
+that it has there: 0.25 m of a lane of 3.25 m are 0.5 m on the wider lane of a turn, at once. Here
+the share is set for the lane that a vehicle enters in the step to come, so that it is beside the
+centre by as many metres as before.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable
+
+    from odscen.sumo.worker.simulation.road_lanes import RoadLanes
+
+_LONGEST_WAIT = 2.0
+"""Seconds after which a vehicle is looked at in any case: a rule may have made it faster."""
+_LEAST = 1e-4
+"""Metres that are no change."""
+
+
+class _Entry(NamedTuple):
+    """A vehicle that may enter another lane: its lane, the metres beside the centre, as set."""
+
+    lane: str
+    beside: float
+    given: float
+
+
+class LateralPlaces:
+    """Keeps vehicles where they are beside the centres of their lanes.
+
+    Parameters
+    ----------
+    sumo, errors
+        libsumo, and what it raises.
+    lanes
+        Those of the network.
+    native
+        Gives the function of libsumo behind one of Python, by domain and name.
+    """
+
+    def __init__(
+        self,
+        sumo: Any,
+        errors: tuple[type[Exception], ...],
+        lanes: RoadLanes,
+        native: Callable[[str, str], Any],
+    ) -> None:
+        self._sumo, self._errors, self._lanes = sumo, errors, lanes
+        self._beside = native("vehicle", "getLateralLanePosition")
+        self._departed_number, self._departed = (
+            native("simulation", f"getDeparted{what}") for what in ("Number", "IDList")
+        )
+        self._step, self._step_length = -1, 0.0
+        self._is_kept_by_sumo = False
+        self._due: dict[int, list[str]] = {}
+        self._entries: dict[str, _Entry] = {}
+        self._widths: dict[str, tuple[float, float]] = {}
+        self._lane_sizes: dict[str, tuple[float, float]] = {}
+
+    def before_step(
+        self, *, only: frozenset[str] | None = None, moved: Collection[str] = ()
+    ) -> None:
+        """Prepare those who may enter another lane in the step to come.
+
+        Parameters
+        ----------
+        only
+            Whose places are kept; ``None``: everyone's.
+        moved
+            Who is driven by something else.
+        """
+        if self._step < 0:
+            simulation = self._sumo.simulation
+            self._step_length = float(simulation.getDeltaT())
+            self._is_kept_by_sumo = float(simulation.getOption("lateral-resolution") or 0.0) > 0.0
+        if self._is_kept_by_sumo:
+            return
+        self._step += 1
+        self._restore()
+        if self._step == 0:
+            names: Iterable[str] = self._sumo.vehicle.getIDList()
+        elif self._departed_number():
+            names = self._departed()
+        else:
+            names = ()
+        due = [name for name in names if only is None or name in only]
+        for name in (*due, *self._due.pop(self._step, ())):
+            with suppress(*self._errors):  # it has arrived
+                self._look_at(name, is_moved=name in moved)
+
+    def forget(self) -> None:
+        """Put all where they are, before the state is saved; those in the middle are left alone."""
+        if self._step < 0 or self._is_kept_by_sumo:
+            return
+        self._restore()
+        waiting = [name for names in self._due.values() for name in names]
+        self._due.clear()
+        self._due[self._step + 1] = waiting
+
+    def _restore(self) -> None:
+        """Put back who has not entered another lane."""
+        vehicle = self._sumo.vehicle
+        for name, entry in self._entries.items():
+            with suppress(*self._errors):
+                if vehicle.getLaneID(name) == entry.lane:
+                    moved_aside = self._beside(name) - entry.given
+                    vehicle.setLateralLanePosition(name, entry.beside + moved_aside)
+        self._entries.clear()
+
+    def _look_at(self, name: str, *, is_moved: bool) -> None:
+        beside = float(self._beside(name))
+        if beside == 0.0:
+            self._widths.pop(name, None)
+            return
+        vehicle = self._sumo.vehicle
+        lane = vehicle.getLaneID(name)
+        if is_moved or not lane:
+            self._plan_look(name, self._step_length)
+            return
+        width, gains = self._widths.get(name) or (vehicle.getWidth(name), vehicle.getAccel(name))
+        self._widths[name] = width, gains
+        speed, seconds = vehicle.getSpeed(name), self._step_length
+        rest = self._size_of(lane)[0] - vehicle.getLanePosition(name)
+        if (speed + gains * seconds) * seconds < rest:
+            reaching = (math.sqrt(speed * speed + 2.0 * gains * rest) - speed) / gains
+            self._plan_look(name, reaching)
+            return
+        likely = max(0.0, speed + vehicle.getAcceleration(name) * seconds) * seconds
+        entered = self._find_lane(name, lane, likely - rest)
+        given = beside if entered is None else self._scale(beside, width, lane, entered)
+        if abs(given - beside) > _LEAST:
+            vehicle.setLateralLanePosition(name, given)
+            self._entries[name] = _Entry(lane, beside, given)
+        self._plan_look(name, seconds)
+
+    def _plan_look(self, name: str, seconds: float) -> None:
+        """Look again one step before so many seconds have passed, or in the next step."""
+        steps = max(1, int(min(seconds, _LONGEST_WAIT) / self._step_length) - 1)
+        self._due.setdefault(self._step + steps, []).append(name)
+
+    def _scale(self, beside: float, width: float, lane: str, entered: str) -> float:
+        """Metres that SUMO makes ``beside`` of where another lane is entered."""
+        room, more_room = (self._size_of(name)[1] - width for name in (lane, entered))
+        given = beside * room / more_room if more_room > 0.0 else beside
+        if max(2.0 * abs(beside) - more_room, 2.0 * abs(given) - room) >= 0.0:
+            return beside  # who is over the border of a lane stays so
+        return given
+
+    def _find_lane(self, name: str, lane: str, beyond: float) -> str | None:
+        """The lane that is ``beyond`` metres behind the end of one, on the way of a vehicle."""
+        edges: Iterable[str] | None = None
+        while True:
+            links = self._lanes.links_of[lane]
+            if lane not in self._lanes.internal:
+                if edges is None:
+                    vehicle = self._sumo.vehicle
+                    index = max(0, vehicle.getRouteIndex(name))
+                    edges = iter(vehicle.getRoute(name)[index + 1 :])
+                onto = next(iter(edges), None)
+                edge_of = self._sumo.lane.getEdgeID
+                links = tuple(link for link in links if edge_of(link[0]) == onto)
+            if not links:
+                return None
+            lane = links[0][4] or links[0][0]
+            length = self._size_of(lane)[0]
+            if beyond < length:
+                return lane
+            beyond -= length
+
+    def _size_of(self, lane: str) -> tuple[float, float]:
+        """Length and width of a lane, m."""
+        known = self._lane_sizes.get(lane)
+        if known is None:
+            of = self._sumo.lane
+            known = self._lane_sizes[lane] = float(of.getLength(lane)), float(of.getWidth(lane))
+        return known
