@@ -352,3 +352,4 @@ def run_cars(
         while session.time < end:
             session.turning_gaps.before_step()
             session.step()
+            session.turning_gaps.after_step()

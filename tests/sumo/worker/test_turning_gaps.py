@@ -70,6 +70,7 @@ def turns_between(
         while session.time < 120.0 and session.expected():
             session.turning_gaps.before_step(only=only, moved=moved)
             session.step()
+            session.turning_gaps.after_step()
             happened = session.happened()
             assert happened is None or not happened.collisions
             for name in session.vehicles():
@@ -138,6 +139,7 @@ def drive(net: Path, folder: Path, routes: dict[str, str], *, rerouted: str = ""
         while session.time < 60.0 and session.expected():
             gaps.before_step()
             session.step()
+            gaps.after_step()
             if rerouted and session.time == 4.0:
                 before = session._sumo.vehicle.getRouteID("a")
                 assert session.set_route("a", rerouted.split())

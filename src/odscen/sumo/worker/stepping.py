@@ -168,6 +168,8 @@ class Stepper:
             session.turning_gaps.before_step(only=self._take_gaps, moved=moved)
             session.lateral_places.before_step(only=self._take_gaps, moved=moved)
         after = session.step()
+        if self.behaviour is None:
+            session.turning_gaps.after_step()
         recorder.record(session, now)
         if self.story is not None or self._led is not None:
             self._due = now

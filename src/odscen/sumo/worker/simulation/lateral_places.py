@@ -24,11 +24,12 @@ _LEAST = 1e-4
 
 
 class _Entry(NamedTuple):
-    """A vehicle that may enter another lane: its lane, the metres beside the centre, as set."""
+    """A vehicle that may enter another lane: its lane, metres beside its centre, those set."""
 
     lane: str
     beside: float
     given: float
+    width: float
 
 
 class LateralPlaces:
@@ -104,13 +105,14 @@ class LateralPlaces:
         self._due[self._step + 1] = waiting
 
     def _restore(self) -> None:
-        """Put back who has not entered another lane."""
+        """Put back who did not do in the last step what was likely; changes of lane go on."""
         vehicle = self._sumo.vehicle
-        for name, entry in self._entries.items():
+        for name, (lane, beside, given, width) in self._entries.items():
             with suppress(*self._errors):
-                if vehicle.getLaneID(name) == entry.lane:
-                    moved_aside = self._beside(name) - entry.given
-                    vehicle.setLateralLanePosition(name, entry.beside + moved_aside)
+                now = vehicle.getLaneID(name)
+                aside = beside - self._scale(given, width, lane, now)
+                if abs(aside) > _LEAST:
+                    vehicle.setLateralLanePosition(name, self._beside(name) + aside)
         self._entries.clear()
 
     def _look_at(self, name: str, *, is_moved: bool) -> None:
@@ -131,12 +133,16 @@ class LateralPlaces:
             reaching = (math.sqrt(speed * speed + 2.0 * gains * rest) - speed) / gains
             self._plan_look(name, reaching)
             return
-        likely = max(0.0, speed + vehicle.getAcceleration(name) * seconds) * seconds
-        entered = self._find_lane(name, lane, likely - rest)
-        given = beside if entered is None else self._scale(beside, width, lane, entered)
+        likely = speed + vehicle.getAcceleration(name) * seconds
+        beyond = min(max(0.0, likely), vehicle.getAllowedSpeed(name)) * seconds - rest
+        farthest = (speed + gains * seconds) * seconds - rest
+        entered = self._find_lane(name, lane, beyond if beyond >= 0.0 else 0.5 * farthest)
+        given = beside if entered is None else self._scale(beside, width, entered, lane)
+        if beyond < 0.0 and abs(given) > abs(beside):
+            given = beside  # to be wrong would be to swing out
         if abs(given - beside) > _LEAST:
             vehicle.setLateralLanePosition(name, given)
-            self._entries[name] = _Entry(lane, beside, given)
+        self._entries[name] = _Entry(lane, beside, given, width)
         self._plan_look(name, seconds)
 
     def _plan_look(self, name: str, seconds: float) -> None:
@@ -145,12 +151,15 @@ class LateralPlaces:
         self._due.setdefault(self._step + steps, []).append(name)
 
     def _scale(self, beside: float, width: float, lane: str, entered: str) -> float:
-        """Metres that SUMO makes ``beside`` of where another lane is entered."""
+        """What SUMO makes of metres beside the centre of a lane where another one is entered."""
+        if lane == entered or _edge_of(lane) == _edge_of(entered):
+            return beside
         room, more_room = (self._size_of(name)[1] - width for name in (lane, entered))
-        given = beside * room / more_room if more_room > 0.0 else beside
-        if max(2.0 * abs(beside) - more_room, 2.0 * abs(given) - room) >= 0.0:
-            return beside  # who is over the border of a lane stays so
-        return given
+        # One that is over the border of a lane is so by as much on the next one.
+        over = max(0.0, abs(beside) - 0.5 * room)
+        if room <= 0.0 or more_room <= 0.0 or over > 0.0:
+            return beside
+        return beside * more_room / room
 
     def _find_lane(self, name: str, lane: str, beyond: float) -> str | None:
         """The lane that is ``beyond`` metres behind the end of one, on the way of a vehicle."""
@@ -180,3 +189,7 @@ class LateralPlaces:
             of = self._sumo.lane
             known = self._lane_sizes[lane] = float(of.getLength(lane)), float(of.getWidth(lane))
         return known
+
+
+def _edge_of(lane: str) -> str:
+    return lane.rpartition("_")[0]

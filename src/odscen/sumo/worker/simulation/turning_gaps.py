@@ -52,7 +52,8 @@ _STANDING = 2.0
 """m/s below which it is not sure that one who is in the junction leaves it."""
 _WIDTH = 2.1
 """Metres of the widest body that is looked at, and what lies between two who pass."""
-_FLATTEST = math.radians(15.0)
+_SPACING = 0.25
+"""Metres between places of a path at which bodies are held against another."""
 _MOST_KEPT = 2_000
 """Vehicles, and routes, that are kept in mind; a route takes some kilobytes."""
 _LOOK_AGAIN = 60.0
@@ -60,6 +61,8 @@ _LOOK_AGAIN = 60.0
 _EDGES = 6
 """Edges within :data:`_SIGHT`, at most."""
 _RED = "r"
+_AS_IT_LIKES = -1.0
+"""``setSpeed``: SUMO's driver chooses again."""
 _OBEYING = ("s", "w", "=", "Z")
 """States of links by whose rule a vehicle stops in any case, or goes in turn."""
 _IGNORED = "junctionModel.ignoreIDs"
@@ -73,15 +76,14 @@ _Pair = tuple[str, str]
 class _Crossing:
     """A path that comes towards a turn and crosses it.
 
-    ``pair`` are the edges that it leads from and to, ``here`` and ``there`` metres from where one
-    waits, and from the stop line of the other, to where the paths cross, ``half`` those before and
-    behind it at which bodies may touch; ``inside`` is the speed of the path in the junction, m/s.
+    ``pair`` are the edges that it leads from and to, ``here`` and ``there`` the first and the last
+    metre, from where one waits and from the stop line of the other, at which the front of a body
+    touches what drives on the other path; ``inside`` is the speed of the path in the junction, m/s.
     """
 
     pair: _Pair
-    here: float
-    there: float
-    half: float
+    here: tuple[float, float]
+    there: tuple[float, float]
     inside: float
 
 
@@ -170,6 +172,7 @@ class TurningGaps:
         self._due_of: dict[str, int] = {}
         self._edges: dict[str, tuple[float, float]] = {}
         self._near: dict[str, tuple[str, dict[str, _Turn | None]]] = {}
+        self._held: list[str] = []
 
     def before_step(
         self, *, only: frozenset[str] | None = None, moved: Collection[str] = ()
@@ -213,6 +216,13 @@ class TurningGaps:
                 self._plan_look(name, 1)
             else:
                 self._set_ignored(name, self._passed_by(name, turn))
+
+    def after_step(self) -> None:
+        """Let those go who were held for a step."""
+        for name in self._held:
+            with suppress(*self._errors):  # it may be gone
+                self._sumo.vehicle.setSpeed(name, _AS_IT_LIKES)
+        self._held.clear()
 
     def look_again(self, name: str) -> None:
         """Look at a vehicle that has another route."""
@@ -357,11 +367,16 @@ class TurningGaps:
     def _passed_by(self, name: str, turn: _Turn) -> list[str]:
         """Those whom one who has not begun to turn need not wait for.
 
-        Who has to wait for one starts for none: it would be late for the others.
+        Who has to wait for one starts for none: it would be late for the others. SUMO would let it
+        go when one who is in the junction has passed where paths cross; where they do so at a small
+        angle, the two would touch beside that place, so it is held until they do not.
         """
         free = []
         for other, passes, own in self._find_oncoming(name, turn, waits=True):
             if passes[0] <= own[1] and passes[1] + _BEHIND >= own[0]:
+                if passes[1] < math.inf and self._speed_of(name) < _STANDING:
+                    self._sumo.vehicle.setSpeed(name, 0.0)
+                    self._held.append(name)
                 return []
             free.append(other)
         return free
@@ -416,8 +431,8 @@ class TurningGaps:
         front = self._position_of(name) - (turn.length if waits else 0.0)
         speed, limit = self._speed_of(name), turn.speed * factor
         return (
-            _seconds(crossing.here - crossing.half - front, speed, gains, limit),
-            _seconds(crossing.here + crossing.half + length - front, speed, gains, limit)
+            _seconds(crossing.here[0] - front, speed, gains, limit),
+            _seconds(crossing.here[1] + length - front, speed, gains, limit)
             + (MARGIN if waits else 0.0),
         )
 
@@ -434,12 +449,12 @@ class TurningGaps:
         """Seconds to when a vehicle is where paths cross, at least, and to when it is past."""
         length, gains, factor = self._body_of(name)
         speed, inside = self._speed_of(name), crossing.inside * factor
-        first = crossing.there - crossing.half
+        first = crossing.there[0]
         if to_line > 0.0:
             limit = max(self._allowed_of(name), speed)
             return _seconds(to_line, speed, gains, limit) + first / max(inside, 0.1), math.inf
         begins = _seconds(first + to_line, speed, gains, max(inside, speed))
-        behind = crossing.there + crossing.half + length + to_line
+        behind = crossing.there[1] + length + to_line
         if speed < _STANDING and behind > 0.0:  # it is not sure that it goes on
             return begins, math.inf
         return begins, max(0.0, behind) / max(speed, 0.1)
@@ -533,14 +548,11 @@ class TurningGaps:
                 continue
             parts = [via, *(link[4] for link in links_of[via] if link[4])]
             path = [*shape(parts[0]), *(point for part in parts[1:] for point in shape(part)[1:])]
-            meets = _find_meeting(own, np.array(path))
-            if meets is None:
+            touching = _find_touching(own, np.array(path))
+            if touching is None:
                 continue
-            here, there, angle = meets
-            angle = max(min(angle, math.pi - angle), _FLATTEST)
-            half = 0.5 * _WIDTH * (1.0 / math.sin(angle) + 1.0 / math.tan(angle))
             pair = edge_of(other), edge_of(other_onto)
-            crossing = _Crossing(pair, here, there, half, lane.getMaxSpeed(via))
+            crossing = _Crossing(pair, *touching, lane.getMaxSpeed(via))
             to_line = 0.0
             for part in parts:
                 found[part].append((crossing, to_line, True))
@@ -580,11 +592,53 @@ def _measure_turn(step: Sequence[_Point], other: Sequence[_Point]) -> float:
     return abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
-def _find_meeting(path: FloatArray, other: FloatArray) -> tuple[float, float, float] | None:
-    """Metres along two paths to where they first cross, and the angle there; ``None``: nowhere.
+def _find_touching(
+    path: FloatArray, other: FloatArray
+) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """First and last metre along each of two paths at which a front touches what is on the other.
 
-    Paths have shape (points, 2), m.
+    Around where they first cross; ``None`` if they do not. Paths have shape (points, 2), m. In a
+    turn a front has a corner on the other path long before its middle is there.
     """
+    meeting = _find_meeting(path, other)
+    if meeting is None:
+        return None
+    (along, own), (theirs, others) = _place_on(path), _place_on(other)
+    return (
+        _find_run(along, _touches(own, others), meeting[0]),
+        _find_run(theirs, _touches(others, own), meeting[1]),
+    )
+
+
+def _place_on(path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Metres along a path of places on it, shape (n,), and the places, (n, 2)."""
+    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))))
+    along = np.linspace(0.0, lengths[-1], max(3, math.ceil(lengths[-1] / _SPACING) + 1))
+    return along, np.column_stack([np.interp(along, lengths, axis) for axis in path.T])
+
+
+def _touches(places: FloatArray, others: FloatArray) -> Any:
+    """Whether the front of a body at each place touches one on the other path, (n,)."""
+    ahead = np.gradient(places, axis=0)
+    across = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    across *= 0.5 * _WIDTH / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    front = np.stack([places - across, places, places + across], axis=1)
+    apart = np.hypot(*np.moveaxis(front[:, :, None] - others[None, None], -1, 0))
+    return apart.min(axis=(1, 2)) <= 0.5 * _WIDTH
+
+
+def _find_run(along: FloatArray, touches: Any, at: float) -> tuple[float, float]:
+    """First and last place of those around one that touch."""
+    first = last = int(np.argmin(np.abs(along - at)))
+    while first > 0 and touches[first - 1]:
+        first -= 1
+    while last < len(along) - 1 and touches[last + 1]:
+        last += 1
+    return float(along[first]), float(along[last])
+
+
+def _find_meeting(path: FloatArray, other: FloatArray) -> tuple[float, float] | None:
+    """Metres along two paths, shape (points, 2), to where they first cross; ``None``: nowhere."""
     steps, others = np.diff(path, axis=0)[:, None], np.diff(other, axis=0)[None]
     apart = other[None, :-1] - path[:-1, None]
     across = _cross_product(steps, others)
@@ -598,8 +652,7 @@ def _find_meeting(path: FloatArray, other: FloatArray) -> tuple[float, float, fl
     lengths, their_lengths = np.hypot(*steps[:, 0].T), np.hypot(*others[0].T)
     along = lengths[:row].sum() + share[row, column] * lengths[row]
     theirs = their_lengths[:column].sum() + their_share[row, column] * their_lengths[column]
-    dot = float(steps[row, 0] @ others[0, column])
-    return float(along), float(theirs), math.atan2(abs(float(across[row, column])), dot)
+    return float(along), float(theirs)
 
 
 def _cross_product(vectors: FloatArray, others: FloatArray) -> FloatArray:
