@@ -17,7 +17,7 @@ from tests.maps.importers.test_openstreetmap import place_of
 
 STEP = 0.1
 HEAD = "time,id,x,y,hdg,speed,length,width,class\n"
-COLUMNS = "columns=time=time,id=id,x=x,y=y,hdg=hdg,speed=speed,length=length,width=width,kind=class"
+COLUMNS = "time=time,id=id,x=x,y=y,hdg=hdg,speed=speed,length=length,width=width,kind=class"
 
 
 def _write_tracks(folder: Path, rows: list[str]) -> Path:
@@ -27,12 +27,12 @@ def _write_tracks(folder: Path, rows: list[str]) -> Path:
 
 
 def users_at_once(folder: Path, number: int) -> Path:
-    """Cars two metres apart on the lanes of the crossing's long road, ten frames of each."""
+    """Cars eight metres apart on a line that the crossing's long road is a part of, ten frames."""
     return _write_tracks(
         folder,
         [
-            f"{frame * STEP:.1f},c{n},{-200 + 2.0 * (n % 180) + 0.8 * frame:.2f},"
-            f"{-1.625 - 3.25 * (n // 180 % 2):.3f},0,8,1.9,1.6,car\n"
+            f"{frame * STEP:.1f},c{n},{8.0 * (n - number // 2) + 0.8 * frame:.2f},-1.625,"
+            "0,8,4.5,1.8,car\n"
             for n in range(number)
             for frame in range(10)
         ],

@@ -21,7 +21,7 @@ A town of 3.4 MB needs 245 MB; what is known of a map by its size is the least t
 of 10 kB with 200 km of motorway needs 1.2 GB."""
 LEAST_MEMORY = 0.25
 """Gigabytes below which the libraries fail on their own, in words of their own."""
-MAP_SECONDS = 15.0
+MAP_SECONDS = 60.0
 MAP_SECONDS_PER_MEGABYTE = 10.0
 """Computing time for a map, and for each megabyte at 2 m; the town needs 2.4 s of 49 s."""
 PACKING = 10

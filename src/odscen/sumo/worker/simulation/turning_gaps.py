@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
     from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
-MARGIN = 0.5
+MARGIN = 0.3
 """Seconds from when a body has left the place where paths cross to when the next one is there."""
 _BEHIND = 0.3
 """Seconds behind a body that is past that place."""
