@@ -20,7 +20,7 @@ def test_a_larger_map_and_a_closer_spacing_may_use_more() -> None:
     small, large = (BY_SIZE.for_map(size, spacing=2.0) for size in (10_000, 3_000_000))
     close = BY_SIZE.for_map(1_000_000, spacing=0.5)
     assert small.memory < large.memory <= MOST_MEMORY
-    assert (large.seconds, close.seconds) == (45.0, 55.0)
+    assert (large.seconds, close.seconds) == (90.0, 100.0)
     assert close.memory > BY_SIZE.for_map(1_000_000, spacing=2.0).memory
 
 

@@ -23,7 +23,7 @@ LEAST_MEMORY = 0.25
 """Gigabytes below which the libraries fail on their own, in words of their own."""
 MAP_SECONDS = 60.0
 MAP_SECONDS_PER_MEGABYTE = 10.0
-"""Computing time for a map, and for each megabyte at 2 m; the town needs 2.4 s of 49 s."""
+"""Computing time for a map, and for each megabyte at 2 m; the town needs 2.4 s of 94 s."""
 PACKING = 10
 """Bytes of XML for each byte of a packed file or of PBF; Helsinki's 0.6 MB of PBF are 7 MB."""
 DOCUMENT_MEMORY = 384 << 20
