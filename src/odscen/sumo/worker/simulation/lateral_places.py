@@ -152,7 +152,8 @@ class LateralPlaces:
 
     def _scale(self, beside: float, width: float, lane: str, entered: str) -> float:
         """What SUMO makes of metres beside the centre of a lane where another one is entered."""
-        if lane == entered or _edge_of(lane) == _edge_of(entered):
+        edge_of = self._sumo.lane.getEdgeID
+        if lane == entered or edge_of(lane) == edge_of(entered):
             return beside
         room, more_room = (self._size_of(name)[1] - width for name in (lane, entered))
         # One that is over the border of a lane is so by as much on the next one.
@@ -189,7 +190,3 @@ class LateralPlaces:
             of = self._sumo.lane
             known = self._lane_sizes[lane] = float(of.getLength(lane)), float(of.getWidth(lane))
         return known
-
-
-def _edge_of(lane: str) -> str:
-    return lane.rpartition("_")[0]
