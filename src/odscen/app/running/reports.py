@@ -206,7 +206,10 @@ def _render_page(
 
 @lru_cache(maxsize=4)
 def _map_names(loaded: LoadedMap) -> PlaceNames:
-    return place_names(loaded.sumo.graph, road_names(loaded.entry.read("xodr")))
+    entry = loaded.entry
+    # A map that was removed under the run has left what the run needs, but no names.
+    names = road_names(entry.read("xodr")) if entry.path("xodr").exists() else {}
+    return place_names(loaded.sumo.graph, names)
 
 
 def _read_parking_use(folder: Path, summary: Mapping[str, Any]) -> ParkingUse | None:
