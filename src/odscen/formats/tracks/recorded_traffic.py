@@ -43,6 +43,9 @@ heading), ``length``, ``width`` (m, null if the file has none) and ``quality``: 
 
 _WORDS: Final = frozenset({"id", "kind"})
 """Columns of a file that may have text."""
+_NUMBERS: Final = frozenset(
+    {"time", "x", "y", "hdg", "vx", "vy", "ax", "ay", "speed", "acceleration", "length", "width"}
+)
 _MOST_ROWS = 100_000
 FARTHEST: Final = {"time": 1e11, "x": 1e8, "y": 1e8}
 """Seconds (of any clock that began in the last 3,000 years) and metres beyond which nothing is."""
@@ -202,8 +205,10 @@ def _with_known_types(rows: pl.DataFrame) -> pl.DataFrame:
         known = kind.is_numeric() or kind in (pl.Boolean, pl.Null)
         if of_words and (known or kind in (pl.String, pl.Categorical, pl.Enum)):
             made.append(pl.col(name).cast(pl.String))
+        elif name == "fragment" or not (of_words or name in _NUMBERS):
+            continue
         elif known:
-            made.append(pl.col(name).cast(pl.Boolean if name == "fragment" else pl.Float64))
+            made.append(pl.col(name).cast(pl.Float64))
         else:
             wanted = "text or a number" if of_words else "a number"
             raise InputError(f"it is of type {kind}, not {wanted}", element=f"{name} of road users")

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 _LONGEST_WAIT = 2.0
 """Seconds after which a vehicle is looked at in any case: a rule may have made it faster."""
+_LONGEST_STEP = 0.5
+"""Seconds of a step up to which this is done: beyond it is not foreseen who enters a lane."""
 _LEAST = 1e-4
 """Metres that are no change."""
 
@@ -58,7 +60,7 @@ class LateralPlaces:
             native("simulation", f"getDeparted{what}") for what in ("Number", "IDList")
         )
         self._step, self._step_length = -1, 0.0
-        self._is_kept_by_sumo = False
+        self._is_left_to_sumo = False
         self._due: dict[int, list[str]] = {}
         self._entries: dict[str, _Entry] = {}
         self._widths: dict[str, tuple[float, float]] = {}
@@ -79,8 +81,9 @@ class LateralPlaces:
         if self._step < 0:
             simulation = self._sumo.simulation
             self._step_length = float(simulation.getDeltaT())
-            self._is_kept_by_sumo = float(simulation.getOption("lateral-resolution") or 0.0) > 0.0
-        if self._is_kept_by_sumo:
+            sublane = float(simulation.getOption("lateral-resolution") or 0.0) > 0.0
+            self._is_left_to_sumo = sublane or self._step_length > _LONGEST_STEP
+        if self._is_left_to_sumo:
             return
         self._step += 1
         self._restore()
@@ -97,7 +100,7 @@ class LateralPlaces:
 
     def forget(self) -> None:
         """Put all where they are, before the state is saved; those in the middle are left alone."""
-        if self._step < 0 or self._is_kept_by_sumo:
+        if self._step < 0 or self._is_left_to_sumo:
             return
         self._restore()
         waiting = [name for names in self._due.values() for name in names]
