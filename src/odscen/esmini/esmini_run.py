@@ -186,7 +186,7 @@ class Esmini(Simulator[EsminiRun]):
                 return SimulationOutcome(
                     None, None, outcome.wall_seconds, error=outcome.error or "it was stopped"
                 )
-            files = self._export(prepared, tracks, sumo_run, outcome.sim_seconds)
+            files = self._export_files(prepared, tracks, sumo_run, outcome.sim_seconds)
             place = staging / "esmini"
             place.mkdir()
             for name, content in files.items():
@@ -205,7 +205,7 @@ class Esmini(Simulator[EsminiRun]):
                 prepared, prepared.on, tracks, self.label, compared=frozenset(rows.values())
             )
             played = _Played(shown, rows, prepared.plan.until - prepared.plan.step_length / 2)
-            error, stopped = self._play(place, folder / LOG_FILE, prepared, played, reporter)
+            error, stopped = self._play_files(place, folder / LOG_FILE, prepared, played, reporter)
         outcome = shown.write(folder)
         for words in (*shown.notes(), *played.notes()):
             reporter.said(words)
@@ -240,7 +240,7 @@ class Esmini(Simulator[EsminiRun]):
             )
         return release[1]
 
-    def _export(
+    def _export_files(
         self, prepared: EsminiRun, tracks: SumoTracks, sumo_run: Path, until: float
     ) -> ExportFiles:
         """Write what esmini plays."""
@@ -269,7 +269,7 @@ class Esmini(Simulator[EsminiRun]):
         )
         return _write_scenario(prepared.scenario, prepared.on, recorded)
 
-    def _play(
+    def _play_files(
         self, place: Path, log: Path, prepared: EsminiRun, played: _Played, reporter: Reporter
     ) -> tuple[str | None, bool]:
         """Let esmini play; why it failed, and whether it was stopped."""

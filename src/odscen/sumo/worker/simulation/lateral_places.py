@@ -63,7 +63,6 @@ class LateralPlaces:
         self._is_left_to_sumo = False
         self._due: dict[int, list[str]] = {}
         self._entries: dict[str, _Entry] = {}
-        self._widths: dict[str, tuple[float, float]] = {}
         self._lane_sizes: dict[str, tuple[float, float]] = {}
 
     def before_step(
@@ -86,7 +85,7 @@ class LateralPlaces:
         if self._is_left_to_sumo:
             return
         self._step += 1
-        self._restore()
+        self._put_back()
         if self._step == 0:
             names: Iterable[str] = self._sumo.vehicle.getIDList()
         elif self._departed_number():
@@ -102,18 +101,18 @@ class LateralPlaces:
         """Put all where they are, before the state is saved; those in the middle are left alone."""
         if self._step < 0 or self._is_left_to_sumo:
             return
-        self._restore()
+        self._put_back()
         waiting = [name for names in self._due.values() for name in names]
         self._due.clear()
         self._due[self._step + 1] = waiting
 
-    def _restore(self) -> None:
+    def _put_back(self) -> None:
         """Put back who did not do in the last step what was likely; changes of lane go on."""
         vehicle = self._sumo.vehicle
         for name, (lane, beside, given, width) in self._entries.items():
             with suppress(*self._errors):
                 now = vehicle.getLaneID(name)
-                aside = beside - self._scale(given, width, lane, now)
+                aside = beside - self._scale_offset(given, width, lane, now)
                 if abs(aside) > _LEAST:
                     vehicle.setLateralLanePosition(name, self._beside(name) + aside)
         self._entries.clear()
@@ -121,15 +120,13 @@ class LateralPlaces:
     def _look_at(self, name: str, *, is_moved: bool) -> None:
         beside = float(self._beside(name))
         if beside == 0.0:
-            self._widths.pop(name, None)
             return
         vehicle = self._sumo.vehicle
         lane = vehicle.getLaneID(name)
         if is_moved or not lane:
             self._plan_look(name, self._step_length)
             return
-        width, gains = self._widths.get(name) or (vehicle.getWidth(name), vehicle.getAccel(name))
-        self._widths[name] = width, gains
+        width, gains = vehicle.getWidth(name), vehicle.getAccel(name)
         speed, seconds = vehicle.getSpeed(name), self._step_length
         rest = self._size_of(lane)[0] - vehicle.getLanePosition(name)
         if (speed + gains * seconds) * seconds < rest:
@@ -140,7 +137,7 @@ class LateralPlaces:
         beyond = min(max(0.0, likely), vehicle.getAllowedSpeed(name)) * seconds - rest
         farthest = (speed + gains * seconds) * seconds - rest
         entered = self._find_lane(name, lane, beyond if beyond >= 0.0 else 0.5 * farthest)
-        given = beside if entered is None else self._scale(beside, width, entered, lane)
+        given = beside if entered is None else self._scale_offset(beside, width, entered, lane)
         if beyond < 0.0 and abs(given) > abs(beside):
             given = beside  # to be wrong would be to swing out
         if abs(given - beside) > _LEAST:
@@ -153,16 +150,14 @@ class LateralPlaces:
         steps = max(1, int(min(seconds, _LONGEST_WAIT) / self._step_length) - 1)
         self._due.setdefault(self._step + steps, []).append(name)
 
-    def _scale(self, beside: float, width: float, lane: str, entered: str) -> float:
+    def _scale_offset(self, beside: float, width: float, lane: str, entered: str) -> float:
         """What SUMO makes of metres beside the centre of a lane where another one is entered."""
         edge_of = self._sumo.lane.getEdgeID
         if lane == entered or edge_of(lane) == edge_of(entered):
             return beside
         room, more_room = (self._size_of(name)[1] - width for name in (lane, entered))
-        # One that is over the border of a lane is so by as much on the next one.
-        over = max(0.0, abs(beside) - 0.5 * room)
-        if room <= 0.0 or more_room <= 0.0 or over > 0.0:
-            return beside
+        if more_room <= 0.0 or abs(beside) > 0.5 * room:
+            return beside  # who is over the border of a lane is left as it is
         return beside * more_room / room
 
     def _find_lane(self, name: str, lane: str, beyond: float) -> str | None:

@@ -605,8 +605,8 @@ def _find_touching(
         return None
     (along, own), (theirs, others) = _place_on(path), _place_on(other)
     return (
-        _find_run(along, _touches(own, others), meeting[0]),
-        _find_run(theirs, _touches(others, own), meeting[1]),
+        _find_run(along, _find_touching_fronts(own, others), meeting[0]),
+        _find_run(theirs, _find_touching_fronts(others, own), meeting[1]),
     )
 
 
@@ -617,7 +617,7 @@ def _place_on(path: FloatArray) -> tuple[FloatArray, FloatArray]:
     return along, np.column_stack([np.interp(along, lengths, axis) for axis in path.T])
 
 
-def _touches(places: FloatArray, others: FloatArray) -> Any:
+def _find_touching_fronts(places: FloatArray, others: FloatArray) -> Any:
     """Whether the front of a body at each place touches one on the other path, (n,)."""
     ahead = np.gradient(places, axis=0)
     across = np.column_stack([-ahead[:, 1], ahead[:, 0]])
