@@ -15,6 +15,7 @@ from odscen.app.exchange.imports import ImportedFile, import_file
 from odscen.app.running.runs import run
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
+from odscen.scenario.placing.bodies import body_of
 from tests.app.test_scenario_imports import FILE, ROAD, SPEED
 
 if TYPE_CHECKING:
@@ -522,3 +523,67 @@ def test_a_catalog_is_found_from_a_folder_above_the_file(
     found = read(workspace, inside, text)
     assert found.lists["refused"] == []
     assert found.scenario.actors[-1].id == "VRU"
+
+
+PERFORMANCE = '<Performance maxSpeed="70" maxAcceleration="4" maxDeceleration="1.5"/>'
+
+
+@pytest.mark.parametrize(
+    ("dynamics", "to", "measure", "value"),
+    [
+        # From a standstill: a cubic from 0 to 20 m/s in T is at most 1.5 * 20 / T.
+        ('dynamicsShape="cubic" dynamicsDimension="time" value="2"', 20.0, "over", 7.5),
+        ('dynamicsShape="linear" dynamicsDimension="time" value="6"', 20.0, "over", 6.0),
+        ('dynamicsShape="linear" dynamicsDimension="rate" value="9"', 20.0, "rate", 4.0),
+        # As long as the cubic: pi / 2 * 20 / rate = 1.5 * 20 / 3.
+        ('dynamicsShape="cubic" dynamicsDimension="rate" value="3"', 20.0, "rate", np.pi),
+    ],
+)
+def test_speeds_change_no_faster_than_the_performance_of_a_vehicle(
+    workspace: Workspace, tmp_path: Path, dynamics: str, to: float, measure: str, value: float
+) -> None:
+    text = scene().replace(SPEED, SPEED.replace(
+        'dynamicsShape="linear" dynamicsDimension="rate" value="2"', dynamics
+    ).replace('value="5"', f'value="{to}"'))  # fmt: skip
+    van = '<Vehicle name="v" vehicleCategory="van"/>'
+    limited = van.replace("/>", f">{PERFORMANCE}</Vehicle>")
+    found = read(workspace, tmp_path, text.replace(van, limited))
+    (part,) = rule(found, "later")["then"]
+    assert part["speed"][measure] == pytest.approx(value, abs=1e-4)
+    said = any("Performance" in reason for reason in reasons(found, "approximated"))
+    assert said == (value in (7.5, 4.0))
+
+
+def test_a_gap_without_limits_is_there_from_the_start_and_held_when_the_other_one_brakes(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    gap = (
+        '<PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" '
+        'freespace="true" continuous="true" distance="12" coordinateSystem="entity" '
+        'displacement="leadingReferencedEntity"/></LongitudinalAction></PrivateAction>'
+    )
+    text = scene().replace("</PrivateAction></Private></Actions>",
+                           f"</PrivateAction>{gap}</Private></Actions>")  # fmt: skip
+    text = text.replace('dLane="-1" ds="40"', 'dLane="0" ds="40"')
+    text = text.replace('<EntityRef entityRef="Other"/></Actors>',
+                        '<EntityRef entityRef="Ego"/></Actors>', 1)  # fmt: skip
+    braking = event("brakes", private(SPEED))
+    found = read(workspace, tmp_path, text.replace("</Maneuver>", f"{braking}</Maneuver>"))
+    done = run(workspace, found.scenario, settings=RunSettings(until=6.0), name="r", out=tmp_path)
+    rows = done.trajectories().sort("time")
+    ego, other = (rows.filter(rows["id"] == name)["x"].to_numpy() for name in ("Ego", "Other"))
+    van = body_of(next(one for one in found.scenario.actors if one.id == "Other")).length
+    apart = other[: len(ego)] - ego[: len(other)] - (5.0 + van) / 2.0
+    speeds = rows.filter(rows["id"] == "Ego")["speed"]
+    assert (speeds[0], speeds[-1]) == pytest.approx((10.0, 5.0), abs=0.3)
+    assert apart == pytest.approx(12.0, abs=0.3)
+    assert any("held with up to 100" in reason for reason in reasons(found, "approximated"))
+
+
+def test_a_start_against_a_lane_without_an_opposite_one_is_said(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    start = '<LanePosition roadId="0" laneId="-2" s="200"><Orientation type="relative" h="3.1416"/>'
+    text = re.sub(r"<RelativeLanePosition .*?/>", f"{start}</LanePosition>", scene())
+    found = read(workspace, tmp_path, text)
+    assert any("heads against it" in reason for reason in reasons(found, "approximated"))

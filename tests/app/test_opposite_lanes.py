@@ -96,14 +96,18 @@ def test_who_overtakes_in_the_opposite_lane_stays_there_until_it_cuts_in(
     assert other["speed"][-1] == pytest.approx(20.0 - 2.0 * (time[-1] - end), abs=0.3)
 
 
+@pytest.mark.parametrize(
+    "target",
+    ['<AbsoluteTargetLane value="1"/>', '<RelativeTargetLane entityRef="Other" value="1"/>'],
+)
 def test_a_change_into_the_opposite_lane_is_one_beside_its_own(
-    workspace: Workspace, tmp_path: Path
+    workspace: Workspace, tmp_path: Path, target: str
 ) -> None:
     (tmp_path / "road.xodr").write_text(TWO_WAY)
     file = tmp_path / "scene.xosc"
     own = '<LanePosition roadId="0" laneId="-1" s="20"/>'
     close = AHEAD.replace("greater", "less").replace('"20"', '"25"')
-    file.write_text(overtaking('<AbsoluteTargetLane value="1"/>', close).replace(STARTS, own))
+    file.write_text(overtaking(target, close).replace(STARTS, own))
     done, rows = play(workspace, file, tmp_path)
     begin, end = instant(done, "cut-in", "started"), instant(done, "cut-in", "ended")
     other = rows["Other"]

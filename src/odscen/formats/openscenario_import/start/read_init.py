@@ -254,6 +254,9 @@ class ActorPlaces:
             words = f"{abs(along):.2f} m along its lane from there, where that begins or ends"
             self._report.mark(entity.element, "approximated", words)
             ahead = 0.0
+        if math.cos(centre.hdg - hdg) < 0.0:
+            words = "it drives the way of its lane: it heads against it, and no other one is near"
+            self._report.mark(entity.element, "approximated", words)
         goal = self._positions.along(node, _FAR)
         return {
             "spawn": str(node_id(graph, node)),
@@ -343,8 +346,10 @@ class InitReader:
                 continue
             gap = element.find("LongitudinalAction/LongitudinalDistanceAction")
             try:
-                if gap is not None and gap.get("continuous") != "true":
+                keeps = gap is not None and gap.get("continuous") == "true"
+                if gap is not None and not (keeps and gap.find("DynamicConstraints") is not None):
                     self._set_apart(private.get("entityRef", ""), entity, gap)
+                if gap is not None and not keeps:
                     continue
                 self._then.setdefault(entity.id, []).extend(story.actions.actions(element, entity))
             except RefusedError as error:
@@ -456,6 +461,9 @@ class InitReader:
         then = self._then.get(entity.id, [])
         changes = [action["speed"] for action in then if "speed" in action]
         speed = changes[-1]["to"] if changes else 0.0
+        kept = [action["keep_gap"]["to"] for action in then if "keep_gap" in action]
+        if kept and not changes and self._story.actions is not None:
+            speed = self._story.actions.speeds.get(kept[-1], 0.0)  # ... of whom it keeps a gap to
         # What takes time begins from a standstill, which entities are at before the first action.
         first = speed if all(change.get("shape") == "step" for change in changes) else 0.0
         made: dict[str, Any] = {"id": entity.id, "category": str(entity.category)}
@@ -463,7 +471,8 @@ class InitReader:
             made["size"] = entity.body._asdict()
         if entity.category is Category.PEDESTRIAN:
             made |= self._places.walker(centre)
-            if then and not changes:  # entities stand until an action gives them a speed
+            stands = any("stop" in action for action in then)
+            if then and not changes and not stands:  # as entities do until they get a speed
                 then = [{"speed": {"to": 0.0, "shape": "step"}}, *then]
             then = then or [{"stop": {}}]
             if not late:
@@ -477,7 +486,7 @@ class InitReader:
             driver = drivers[-1] if drivers else "story"
             made |= {"driver": driver} if driver == "story" and not free else {}
             then = [action for action in then if "goal" not in action and "drive" not in action]
-            if not changes:
+            if not changes and not kept:
                 then.append({"speed": {"to": 0.0, "shape": "step"}})
             then = self._places.at_first(centre, left, then, made)
         if entity.ego:

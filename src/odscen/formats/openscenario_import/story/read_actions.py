@@ -89,11 +89,15 @@ def to_opposite(
 # -------------------------------------------------------------- private actions as actions of rules
 Made = dict[str, Any]
 _SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}
+_PEAKS: Final = {"linear": 1.0, "sinusoidal": math.pi / 2.0, "cubic": 1.5}
+"""Greatest rate of a change, in those of an even one."""
 _MEASURES: Final = {"time": "over", "rate": "rate", "distance": "within"}
 FOLLOWING: Final = "following"
 """Key of actions that follow one another, of one action of the file."""
 _USUAL: Final = 3.0
 """Seconds of a lateral action that gives no measure that can be turned into some."""
+_RIGID: Final = 100.0
+"""m/s², of a gap that is to be held without limits: the most that a rule can say."""
 IGNORED: Final = frozenset(
     {"ControllerAction", "ActivateControllerAction", "VisibilityAction", "AppearanceAction"}
 )
@@ -203,8 +207,9 @@ def _read_speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     if dynamics is None or target is None:
         raise RefusedError(kind, "a speed without dynamics or target")
     to = read.absolute_speed(target)
-    read.speeds[entity.id] = to
     shape, value = dynamics.get("dynamicsShape", "step"), report.number(dynamics, "value", 0.0)
+    before = read.speeds.get(entity.id, 0.0)
+    read.speeds[entity.id] = to
     if entity.category is Category.PEDESTRIAN and to == 0.0:
         return {"stop": {}}
     if shape == "step" or value == 0:
@@ -212,8 +217,31 @@ def _read_speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     if shape == "cubic":
         report.mark(dynamics, "approximated", "a cubic is a half-cosine")
     measure = _MEASURES.get(dynamics.get("dynamicsDimension", "time"), "over")
-    value = abs(value) if measure != "rate" else min(abs(value), 100.0)
+    value = min(abs(value), 100.0) if measure == "rate" else abs(value)
+    most = _performance_limit(read, entity, faster=to > before)
+    peak = _PEAKS.get(shape, 1.0) * abs(to - before)
+    if measure == "rate" and value > most:
+        report.mark(dynamics, "approximated", f"{most:g} m/s², the most of its Performance")
+        value = most
+    elif measure == "over" and value * most < peak:
+        value = round(float(peak / most), 4)
+        words = f"{value:g} s from {before:g} m/s, as its Performance allows {most:g} m/s²"
+        report.mark(dynamics, "approximated", words)
+    if shape == "cubic" and measure == "rate":  # a half-cosine that takes as long
+        value *= _PEAKS["sinusoidal"] / _PEAKS["cubic"]
     return {"speed": {"to": to, "shape": _SHAPES.get(shape, "linear"), measure: value}}
+
+
+def _performance_limit(read: ActionReader, entity: ReadEntity, *, faster: bool) -> float:
+    """Most that a vehicle of a file of others accelerates or brakes, m/s²."""
+    report = read.conditions.report
+    limits = None if read.own else report.child(entity.element, "Performance")
+    if limits is None:
+        return math.inf
+    words = "of the speed only what changes over time or by a rate heeds it"
+    report.mark(limits, "approximated", words)
+    most = report.number(limits, "maxAcceleration" if faster else "maxDeceleration", 0.0)
+    return float(most) if most > 0 else math.inf
 
 
 def _read_duration(read: ActionReader, dynamics: _Element | None, entity: ReadEntity) -> float:
@@ -252,7 +280,7 @@ def _read_lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     if lane.tag == "RelativeTargetLane":
         other = read.conditions.actor(lane)
         if other == entity.id and value:
-            return {"lane": {"by": value, "over": over}}
+            return _to_own_neighbour(read, lane, entity, value, over)
         if other != entity.id and value == 0:
             return {"cut_in": {"to": other, "over": over}}
         if other == entity.id:
@@ -284,6 +312,27 @@ def _read_lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         return {"offset": {"to": by * metres, "over": over}}
     report.mark(lane, "approximated", words)
     return {"lane": {"by": by, "over": over}}
+
+
+def _to_own_neighbour(
+    read: ActionReader, lane: _Element, entity: ReadEntity, by: int, over: float
+) -> Made:
+    """Change of so many lanes from its own one; beside it if that is the opposite one."""
+    change: Made = {"lane": {"by": by, "over": over}}
+    if read.own or start_of(read.conditions, entity.id) is None:
+        return change
+    road, own, side = start_lane(read.conditions, lane, entity.id)
+    own = read.lanes.get(entity.id, own)
+    aim = own + side * by
+    aim += 0 if aim * own > 0 else side * (1 if by > 0 else -1)  # there is no lane 0
+    read.lanes[entity.id] = aim
+    metres = to_opposite(read.conditions, entity.id, road, own, aim) if abs(by) == 1 else None
+    if metres is None:
+        return change
+    words = f"{metres:.2f} m beside its own lane, in the opposite one"
+    read.conditions.report.mark(lane, "approximated", words)
+    read.offsets[entity.id] = by * metres
+    return {"offset": {"to": by * metres, "over": over}}
 
 
 def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: float) -> Made:
@@ -382,6 +431,13 @@ def _read_gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
         if limits is None:
             words = "reached by driving with 3 m/s², not at once"
             report.mark(kind, "approximated", words)
+    elif limits is None and not read.own:
+        part["rate"] = _RIGID
+        words = (
+            f"held with up to {_RIGID:g} m/s², a step after the other one's speed; a gap that is "
+            "not there yet is closed within seconds, not at once"
+        )
+        report.mark(kind, "approximated", words)
     if kind.get("freespace") == "false":
         report.mark(kind, "approximated", "between bodies, not reference points")
     return {"keep_gap": part}

@@ -43,6 +43,8 @@ def arriving(
         if place is None:
             raise RefusedError(kind, f"{kind.tag} without {tag}")
         found[field_name] = conditions.point_or_node(place, ahead=who.ahead)
+    words = "how its speed goes on the way is not in the standard: players differ by up to 1 m"
+    report.mark(kind, "approximated", words)
     found |= _on_arrival(conditions.report, kind, conditions.entities[name].id, speeds)
     return {"arrive": {**found, "to": conditions.entities[name].id}}
 
