@@ -92,6 +92,7 @@ REMARKS: Final = {
     "ParameterCondition": ("approximated", "the declared value, and what actions set"),
     "VariableCondition": ("approximated", "the declared value, and what actions set"),
     "MiscObject": ("approximated", "a stationary car"),
+    "Performance": ("approximated", "limits speeds that change over time or by a rate"),
     "DynamicConstraints": ("approximated", "`maxAcceleration` holds for braking too"),
     "VariableDeclaration": ("approximated", "the value is put in where it is named"),
     "ValueConstraint": ("approximated", "a least and a greatest value, both possible"),
