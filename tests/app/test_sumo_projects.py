@@ -24,6 +24,7 @@ from odscen.app.maps import load_map
 from odscen.app.running.runs import run
 from odscen.base.errors import InputError, OdscenError
 from odscen.base.xml_reading import read_xml
+from odscen.convert.model.net import NORMAL
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
 from odscen.runs.recorded import read_lanes, read_light_states, read_visits
@@ -129,6 +130,28 @@ def test_a_project_opens_with_a_map_that_has_its_network(
     net = etree.parse(project / "grid.net.xml").getroot()
     assert edges == {e.get("id") for e in net.iter("edge") if e.get("function") is None}
     assert entry.lane_table().intervals
+
+
+@pytest.mark.parametrize("cells", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_grid_is_put_where_it_is_although_its_offset_puts_it_on_itself(
+    tmp_path: Path, cells: int
+) -> None:
+    command = [
+        BIN / "netgenerate", "--grid", "--grid.number", "4", "--grid.length", "150",
+        "--offset.x", str(-150 * cells), "-o", "grid.net.xml",
+    ]  # fmt: skip
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    store = Workspace.open(tmp_path / "store")
+    made = import_file(store, tmp_path / "grid.net.xml")
+    assert made.scenario is not None
+    lanes = store.map("grid").lane_table()
+    assert lanes.net_offset == (0.0, 0.0)
+    roads = {
+        row for row, lane in enumerate(lanes.lane_list)
+        if lanes.edges[lane.edge].function == NORMAL
+    }  # fmt: skip
+    assert len(roads) == 48
+    assert roads <= {interval.sumo for interval in lanes.intervals}
 
 
 def test_what_is_taken_and_what_runs_on_is_listed(imported: ImportedFile) -> None:
