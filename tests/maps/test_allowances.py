@@ -39,6 +39,13 @@ def test_options_go_before_the_environment_and_that_before_the_size(
     assert BuildLimits(3, 2).for_map(1, spacing=2.0)[:2] == (3_000_000_000, 120.0)
 
 
+def test_a_large_network_that_is_brought_in_may_use_more_and_a_small_one_hardly() -> None:
+    town = BY_SIZE.for_map(61_000_000, spacing=2.0, network=22_900_000)
+    assert town.memory == pytest.approx(3.65e9, rel=0.01)
+    assert town.times_usual == pytest.approx(2.5, rel=0.01)
+    assert BY_SIZE.for_map(10_000, spacing=2.0, network=20_000).memory < 1.21e9
+
+
 @pytest.mark.parametrize("text", ["much", "0", "-1", "nan", "inf", "1e9"])
 def test_a_limit_that_is_no_number_above_zero_is_refused(
     text: str, monkeypatch: pytest.MonkeyPatch

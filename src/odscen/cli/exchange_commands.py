@@ -10,12 +10,15 @@ import typer
 
 from odscen.base.errors import NoMapError
 from odscen.cli.console import (
+    BuildMemoryOption,
+    BuildMinutesOption,
     JsonOption,
     WorkspaceOption,
     as_rows,
     log,
     print_json,
     print_table,
+    progress,
 )
 from odscen.formats import list_formats
 
@@ -93,6 +96,8 @@ def import_(
         ),
     ] = None,
     settings: OptionSettings = None,
+    memory: BuildMemoryOption = None,
+    minutes: BuildMinutesOption = None,
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -103,13 +108,19 @@ def import_(
     listed. Recorded traffic becomes a table of its tracks, and with a map a scenario.
     """
     from odscen.app.exchange.imports import import_file
+    from odscen.maps.allowances import BuildLimits
     from odscen.maps.store import Workspace
 
+    limits = BuildLimits(memory, minutes)
     options = _settings_as_options(settings)
     options |= {name: text for name, text in (("ego", ego), ("window", window)) if text is not None}
     store = Workspace.open(workspace)
     try:
-        read = import_file(store, file, out=out, of=of, maps=maps, on_map=on_map, options=options)
+        with progress(file.name) as step:
+            read = import_file(
+                store, file, out=out, of=of, maps=maps, on_map=on_map, options=options,
+                limits=limits, progress=step,
+            )  # fmt: skip
     except NoMapError as error:
         if not as_json:
             _print_lists(error.lists)

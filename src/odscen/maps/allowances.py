@@ -19,6 +19,10 @@ MOST_MEMORY = 1_450_000_000
 """Bytes of memory for a map, for each byte of it, for each byte at a spacing of 2 m, and at most.
 A town of 3.4 MB needs 245 MB; what is known of a map by its size is the least that it needs: a file
 of 10 kB with 200 km of motorway needs 1.2 GB."""
+NETWORK_MEMORY_PER_BYTE = 96
+"""Bytes beyond the most, for each byte of a network that is brought in: it says all of its lanes,
+as a small ``.xodr`` need not, so that a large one is a whole town. One of 22.9 MB
+needs 2 of 3.6 GB."""
 LEAST_MEMORY = 0.25
 """Gigabytes below which the libraries fail on their own, in words of their own."""
 MAP_SECONDS = 60.0
@@ -150,15 +154,17 @@ class BuildLimits:
         if self.memory is not None and self.memory < LEAST_MEMORY:
             raise InputError(_too_little("--build-memory", self.memory))
 
-    def for_map(self, size: int, *, spacing: float) -> Allowance:
+    def for_map(self, size: int, *, spacing: float, network: int = 0) -> Allowance:
         """What a map may use.
 
         Parameters
         ----------
         size
-            Bytes of the ``.xodr``, and of a network that is brought in for it.
+            Bytes of the ``.xodr``.
         spacing
             Metres between nodes.
+        network
+            Bytes of a network that is brought in for it.
 
         Raises
         ------
@@ -167,10 +173,12 @@ class BuildLimits:
         """
         dense = max(1.0, _USUAL_SPACING / spacing)
         per_byte = MAP_MEMORY_PER_BYTE + NODE_MEMORY_PER_BYTE * dense
+        size += network
+        most = MOST_MEMORY + NETWORK_MEMORY_PER_BYTE * network
         memory = self.memory or _from_environment(MEMORY_VARIABLE)
         minutes = self.minutes or _from_environment(MINUTES_VARIABLE)
         return Allowance(
-            int(memory * 1e9 if memory else min(MOST_MEMORY, MAP_MEMORY + per_byte * size)),
+            int(memory * 1e9 if memory else min(most, MAP_MEMORY + per_byte * size)),
             minutes * 60.0
             if minutes
             else MAP_SECONDS + MAP_SECONDS_PER_MEGABYTE * dense * size / 1e6,

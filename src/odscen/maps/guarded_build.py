@@ -48,8 +48,11 @@ def build_in_child(
     OdscenError
         As :func:`~odscen.maps.map_build.build_map` does.
     """
-    size = unpacked_size(content) + (len(given.net_xml) if given else 0)
-    allowance = limits.for_map(size, spacing=settings.spacing)
+    allowance = limits.for_map(
+        unpacked_size(content),
+        spacing=settings.spacing,
+        network=len(given.net_xml) if given else 0,
+    )
     with scratch_folder() as scratch:
         (folder / _XODR).write_bytes(content)
         network = None

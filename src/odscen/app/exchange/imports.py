@@ -22,6 +22,7 @@ from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_text
 from odscen.formats import find_format, format_of_file
 from odscen.formats.base import ImportMap, ImportSource
+from odscen.maps.allowances import BY_SIZE
 from odscen.maps.converters import GivenNetwork
 from odscen.maps.folder_names import check_name, name_from_file
 from odscen.maps.map_files import read_map_file
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
     from odscen.base.given_files import GivenPath
     from odscen.formats.base import FileContent, GivenFile, ReportRow
+    from odscen.maps.allowances import BuildLimits
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import ProgressCallback, Workspace
     from odscen.scenario.document.problems import Problem
@@ -86,6 +88,8 @@ def import_file(
     maps: GivenPath | None = None,
     on_map: str | None = None,
     options: Mapping[str, str] | None = None,
+    limits: BuildLimits = BY_SIZE,
+    progress: ProgressCallback | None = None,
 ) -> ImportedFile:
     """Read a file of a foreign format: a scenario, or tracks of a recording.
 
@@ -114,6 +118,10 @@ def import_file(
     options
         What the format lets one choose: of ``openscenario`` with ``ego`` what drives the ego,
         ``story`` or ``sumo``.
+    limits
+        What building a map of a SUMO network may use.
+    progress
+        Hears what of that map is being built, and the share that is done.
 
     Returns
     -------
@@ -129,6 +137,8 @@ def import_file(
     NoMapError
         If the map of an OpenSCENARIO file is not found, or it names none; has the report of the
         rest.
+    LimitError
+        If a map that is made of a network needs more than it may have.
     WorkspaceError
         If a file cannot be written.
     """
@@ -149,7 +159,14 @@ def import_file(
             find_entry=find_map,
             options=options,
             map_given=on_map is not None or maps is not None,
-            bring=partial(map_of_network, workspace, on_map=entry, added=added),
+            bring=partial(
+                map_of_network,
+                workspace,
+                on_map=entry,
+                added=added,
+                limits=limits,
+                progress=progress,
+            ),
         )
         plan_file = None
         if out is not None and content.tracks is not None:
@@ -271,6 +288,8 @@ def map_of_network(
     *,
     on_map: MapEntry | None = None,
     added: AddedMaps | None = None,
+    limits: BuildLimits = BY_SIZE,
+    progress: ProgressCallback | None = None,
 ) -> MapEntry:
     """The map that has a SUMO network, made of it if there is none.
 
@@ -287,9 +306,15 @@ def map_of_network(
         The map whose network it is to be.
     added
         Hears of the map if it is a new one.
+    limits
+        What building it may use.
+    progress
+        Hears what is being built, and the share that is done.
 
     Raises
     ------
+    LimitError
+        If it needs more.
     InputError
         If it is no network, or none of that map; if netconvert refuses it, with the first error
         that it names, crashes or passes a limit.
@@ -305,7 +330,7 @@ def map_of_network(
         with scratch_folder() as folder:
             file = folder / "given.net.xml"
             file.write_bytes(content)
-            return workspace.set_network(on_map.name, file)
+            return workspace.set_network(on_map.name, file, limits=limits, progress=progress)
     known = workspace.first_map(has_it)
     if known is not None:
         return known
@@ -321,8 +346,9 @@ def map_of_network(
             f"the SUMO network cannot be read: {words}", file=printable(named)
         ) from error
     entry = workspace.add_map_content(
-        xodr, file=f"{name}.xodr", name=name, network=GivenNetwork(content, printable(named))
-    )
+        xodr, file=f"{name}.xodr", name=name, network=GivenNetwork(content, printable(named)),
+        limits=limits, progress=progress,
+    )  # fmt: skip
     if added is not None:
         added.append(entry)
     return entry

@@ -144,7 +144,10 @@ def read_sent_scenario(
             if seen.get("network") is not None:
                 progress("making a map of the network", 0.1)
                 network = (folder / _NETWORK).read_bytes()
-                entry = map_of_network(workspace, seen["network"], network, added=added)
+                entry = map_of_network(
+                    workspace, seen["network"], network, added=added,
+                    progress=lambda what, share: progress(what, 0.1 + 0.8 * share),
+                )  # fmt: skip
                 read_in_child(entry.name)
             elif seen["map"] is not None:
                 entry = _settle_map(workspace, named, seen["map"], file, added, progress)
