@@ -206,6 +206,34 @@ def test_the_example_of_the_seam_runs(
     assert (found.attempted > 3, found.failed) == (True, 0)
 
 
+def test_a_body_that_turns_on_the_spot_has_the_speed_of_its_centre(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    class Spinning(base.Simulator[base.RoutedRun]):
+        label = "Spinning"
+
+        def prepare(self, scenario: Any, on: Any, settings: Any, _: Any) -> base.RoutedRun:
+            return on.routed_run(scenario, settings)
+
+        def run(self, prepared: Any, folder: Path, reporter: Any) -> Any:
+            record, name = positions.PositionRecord(prepared), prepared.plan.actors[0].id
+            for time in record.times(reporter):
+                turned = 4.0 * time if 2.0 <= time < 4.0 else 0.0
+                at = positions.Position(name, 1.3 * time, 0.0, turned, speed=1.3)
+                record.add(time, [at] if time < 6.0 else [])
+            return record.write(folder)
+
+    run = odscen.run(
+        workspace, sampled, simulator=Spinning(), out=tmp_path,
+        settings=RunSettings(until=8.0, step_length=0.1),
+    )  # fmt: skip
+    table = run.trajectories()
+    assert table.height == 60
+    assert table["hdg"].n_unique() > 15
+    # Its front moves by up to 9 m/s meanwhile.
+    assert table["speed"].to_numpy() == pytest.approx(1.3, abs=1e-6)
+
+
 def test_whoever_is_nowhere_or_comes_back_is_refused(workspace: Workspace, sampled: Path) -> None:
     checked = check_file(workspace, sampled, settings=SETTINGS)
     routed = checked.run_map.routed_run(checked.scenario, SETTINGS)

@@ -19,13 +19,17 @@ SPEED_ERROR = 0.1
 """m/s by which SUMO's speed may differ from that of positions before it is replaced."""
 LANE_JOINT = 0.06
 """Metres that positions slip where lanes meet: what SUMO's shortest lane is long, and rounding."""
+SPEED_OF, BODY_CENTRE = "odscen.speed_of", "body_centre"
+"""What the metadata of a file with trajectories has whose speeds are those of body centres."""
 _JUMPED, _UNSEEN = 0.5, 2.0
 """Metres, and m/s that SUMO's speed may leave out: further elsewhere is a jump and no speed."""
 
 _OPTIONAL = {"z": "z", "lane": "lane", "pos": "pos", "slope": "slope_deg"}
 
 
-def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
+def body_centres(
+    trajectories: pl.DataFrame, plan: Plan, *, by_centres: bool = False
+) -> pl.DataFrame:
     """Where the road users of a plan were.
 
     Parameters
@@ -34,6 +38,9 @@ def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
         As read from ``trajectories.parquet``.
     plan
         Gives the length of each body, its category, and the offset between the frames.
+    by_centres
+        Whether speeds were recorded of body centres, not of fronts. Where a body turns on the spot,
+        its front moves and its centre does not.
 
     Returns
     -------
@@ -41,7 +48,7 @@ def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
         One row per road user and record, sorted by time; columns ``time``, ``id``, ``category``,
         ``row`` (of the plan), ``x``, ``y``, ``hdg``, ``speed``, and of ``z``, ``lane``, ``pos``,
         ``slope_deg`` those that were recorded. Rows without a place are left out. ``speed`` (m/s)
-        is that of the front's positions, see :func:`speeds_of_positions`.
+        is that of the front's positions, or of the centre's, see :func:`speeds_of_positions`.
     """
     import polars as pl
 
@@ -74,13 +81,15 @@ def body_centres(trajectories: pl.DataFrame, plan: Plan) -> pl.DataFrame:
     time, row, speed = (rows[name].to_numpy() for name in ("time", "row", "speed"))
     walking = (rows["category"] == Category.PEDESTRIAN).to_numpy()
     pose = sumo_to_xodr(SumoPose(x, y, 0.0, angle), length=length, net_offset=plan.net_offset)
+    if by_centres:
+        x, y = np.asarray(pose.x), np.asarray(pose.y)
     extra = [name for name in _OPTIONAL.values() if name in rows.columns]
     return rows.with_columns(
         pl.col("row").cast(pl.Int64),
         x=np.asarray(pose.x),
         y=np.asarray(pose.y),
         hdg=np.asarray(pose.hdg),
-        speed=speeds_of_positions(time, row, x, y, angle, speed, walking),
+        speed=speeds_of_positions(time, row, x, y, angle, speed, walking, by_centres=by_centres),
     ).select("time", "id", "category", "row", "x", "y", "hdg", "speed", *extra)
 
 
@@ -92,8 +101,10 @@ def speeds_of_positions(
     angle_deg: FloatArray,
     speed: FloatArray,
     walking: BoolArray,
+    *,
+    by_centres: bool = False,
 ) -> FloatArray:
-    """Speeds at which the fronts of road users really moved.
+    """Speeds at which road users really moved: their fronts, or their centres.
 
     SUMO's speed is that along the centre line of a lane of the length that its edge has: it leaves
     out what a vehicle moves aside, is that of another arc beside the centre, and of a person
@@ -107,6 +118,9 @@ def speeds_of_positions(
         m/s.
     walking
         Who is on foot, of shape ``(N,)``.
+    by_centres
+        Whether places and speeds are those of centres. Bodies turn about these without moving them,
+        so that a way is anything from the chord to the arc.
 
     Returns
     -------
@@ -128,7 +142,10 @@ def speeds_of_positions(
     # The arc over the chord between two places.
     half = 0.5 * np.radians(np.abs(np.mod(np.diff(angle) + 180.0, 360.0) - 180.0))
     half = np.clip(half, 1e-6, 0.5)
-    covered = np.hypot(np.diff(x), np.diff(y)) * half / np.sin(half) / passed
+    straight = np.hypot(np.diff(x), np.diff(y)) / passed
+    covered = straight * half / np.sin(half)
+    if by_centres:
+        covered = np.clip(old[1:], straight, covered)
     error = np.where(same, covered - old[1:], 0.0)
     same &= np.abs(error) * passed < _JUMPED + _UNSEEN * passed
     error = np.where(same, error, 0.0)
@@ -157,7 +174,9 @@ def _empty_positions() -> pl.DataFrame:
     return pl.DataFrame(schema={**ids, **numbers})
 
 
-def replay_columns(trajectories: pl.DataFrame, plan: Plan, *, every: int = 1) -> dict[str, Any]:
+def replay_columns(
+    trajectories: pl.DataFrame, plan: Plan, *, every: int = 1, by_centres: bool = False
+) -> dict[str, Any]:
     """Columns of what SUMO recorded; rows sorted by time.
 
     Parameters
@@ -166,6 +185,8 @@ def replay_columns(trajectories: pl.DataFrame, plan: Plan, *, every: int = 1) ->
         As read from ``trajectories.parquet``.
     every
         Take each ``every``-th step.
+    by_centres
+        As of :func:`body_centres`.
 
     Returns
     -------
@@ -175,7 +196,7 @@ def replay_columns(trajectories: pl.DataFrame, plan: Plan, *, every: int = 1) ->
     """
     import polars as pl
 
-    rows = body_centres(trajectories, plan)
+    rows = body_centres(trajectories, plan, by_centres=by_centres)
     times, number = np.unique(rows["time"].to_numpy(), return_inverse=True)
     kept = number % every == 0
     rows, number, times = rows.filter(pl.Series(kept)), number[kept] // every, times[::every]

@@ -339,7 +339,7 @@ class Run:
                 file=str(self.folder),
             )
         plan = Plan.from_json(self._read_text(layout.PLAN_FILE))
-        return body_centres(recorded.rows, plan).drop("row")
+        return body_centres(recorded.rows, plan, by_centres=recorded.by_centres).drop("row")
 
     def motion(self) -> pl.DataFrame:
         """Find motion that no body or driver makes, and hard braking.

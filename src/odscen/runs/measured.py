@@ -314,7 +314,7 @@ def _measure_motion(records: _Records) -> pl.DataFrame | None:
     plan = Plan.from_json((run / layout.PLAN_FILE).read_text(encoding="utf-8", errors="replace"))
     events = (run / layout.EVENTS_FILE).read_text(encoding="utf-8", errors="replace")
     return check_motion(
-        body_centres(recorded.rows, plan),
+        body_centres(recorded.rows, plan, by_centres=recorded.by_centres),
         plan,
         events_from_json(events),
         _road_lanes(records.facts, plan),

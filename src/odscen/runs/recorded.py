@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.stored_files import tables
 from odscen.figures.measures.conflicts import conflicts_of_slices
+from odscen.records.replay import BODY_CENTRE, SPEED_OF
 from odscen.records.row_text import with_numbered_names
 from odscen.runs.layout import (
     CALLS_FILE,
@@ -32,10 +33,14 @@ _UNUSED = ("vehicle_z", "vehicle_angle")
 
 
 class Recorded(NamedTuple):
-    """Trajectories as SUMO wrote them; of ``every`` records of a road user the first."""
+    """Trajectories as they were written; of ``every`` records of a road user the first.
+
+    ``by_centres`` says that speeds are those of body centres: of runs that SUMO did not record.
+    """
 
     rows: pl.DataFrame
     every: int = 1
+    by_centres: bool = False
 
 
 def recorded_files(run: Path, file: str) -> list[Path]:
@@ -107,13 +112,14 @@ def read_trajectories(run: Path, *, most: int | None = None) -> Recorded | None:
     with tables(_name_of_records(files)):
         table = pl.scan_parquet(files)
         count = table.select(pl.len()).collect().item()
+        by_centres = pl.read_parquet_metadata(files[0]).get(SPEED_OF) == BODY_CENTRE
         if most is None or count <= most or _TIME not in table.collect_schema():
-            return Recorded(table.collect())
+            return Recorded(table.collect(), by_centres=by_centres)
         every = -(-count // most)
         times = table.select(pl.col(_TIME).unique().sort()).collect(engine="streaming")[_TIME]
         kept = times.gather_every(every)
         rows = table.join(kept.to_frame().lazy(), on=_TIME, how="semi", maintain_order="left")
-        return Recorded(rows.collect(engine="streaming"), every)
+        return Recorded(rows.collect(engine="streaming"), every, by_centres)
 
 
 def read_lanes(run: Path) -> pl.DataFrame | None:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from odscen.runs.run_settings import RunSettings
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
+    from odscen.simulators.assets import Assets
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +78,10 @@ class SimulatedMap(Protocol):
     @property
     def sha256(self) -> str:
         """SHA-256 of its OpenDRIVE file, hexadecimal."""
+
+    @property
+    def assets(self) -> Assets:
+        """Models of road users and weather presets that scenarios on it may name."""
 
     @property
     def graph(self) -> MapGraph:

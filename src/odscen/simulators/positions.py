@@ -12,6 +12,7 @@ from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.base.frames import XodrPose, xodr_to_sumo
 from odscen.figures.measures.summary import Trip, actor_outcomes, actors_to_json
+from odscen.records.replay import BODY_CENTRE, SPEED_OF
 from odscen.records.run_events import Event, EventKind, events_to_json
 from odscen.runs import layout
 from odscen.runs.new_run import SimulationOutcome
@@ -250,6 +251,9 @@ def write_trajectories(
 ) -> None:
     """Write states in the columns and the frame that SUMO's own recording has.
 
+    The file says that its speeds are those of body centres; SUMO's are of fronts, see
+    :func:`odscen.records.replay.speeds_of_positions`.
+
     Parameters
     ----------
     states
@@ -276,4 +280,4 @@ def write_trajectories(
             "vehicle_angle": np.asarray(front.angle_deg),
             "vehicle_speed": speed,
         }
-    ).write_parquet(file)
+    ).write_parquet(file, metadata={SPEED_OF: BODY_CENTRE})

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    import polars as pl
+    from odscen.runs.recorded import Recorded
 
 REPLAY_ROWS = 4_000_000
 """Rows that are read at most; of a longer run every second, third, ... record is left out."""
@@ -176,14 +176,14 @@ def egos(run: str, shared: Shared) -> RunEgos:
 @router.get("/{run}/curves")
 def curves(run: str, shared: Shared) -> RunCurves:
     """How many were where, and how fast, over time."""
-    table, plan, _ = _read_recorded(shared, run)
+    plan, recorded = _read_recorded(shared, run)
     path, end = (
         _finished_file(shared, run, layout.ACTORS_FILE),
         summary(run, shared).sim_seconds or 0.0,
     )
     with _name_run_in_errors(path.parent):
         actors = actors_from_json(_read_text(path))
-        found = run_curves(plan, actors, table, end=end)
+        found = run_curves(plan, actors, recorded.rows, end=end)
     return RunCurves(
         counts=RunCurve(**_column_lists(found.counts)),
         speeds=RunSpeeds(**_column_lists(found.speeds)),
@@ -202,11 +202,14 @@ def trajectories(
     ] = None,
 ) -> Response:
     """Where road users were, as columns; see ``docs/server.md``."""
-    table, plan, read = _read_recorded(shared, run)
+    plan, recorded = _read_recorded(shared, run)
+    table, read = recorded.rows, recorded.every
     if most is not None:
         every = max(every, math.ceil(table.height * read / most))
     with _name_run_in_errors(shared.runs.kept.folder(run)):
-        columns = replay_columns(table, plan, every=max(1, every // read))
+        columns = replay_columns(
+            table, plan, every=max(1, every // read), by_centres=recorded.by_centres
+        )
     names = tuple(ReplayActor.model_fields)
     columns["actors"] = [{name: getattr(actor, name) for name in names} for actor in plan.actors]
     return answer(request, pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY)))
@@ -227,15 +230,15 @@ def _name_run_in_errors(run: Path) -> Iterator[None]:
         yield
 
 
-def _read_recorded(shared: Shared, run: str) -> tuple[pl.DataFrame, Plan, int]:
-    """Trajectories, the plan, and every how manyth record was read."""
+def _read_recorded(shared: Shared, run: str) -> tuple[Plan, Recorded]:
+    """The plan of a run, and its trajectories."""
     path = _finished_file(shared, run, layout.PLAN_FILE)
     with _name_run_in_errors(path.parent):
         plan = Plan.from_json(_read_text(path))
     recorded = read_trajectories(path.parent, most=REPLAY_ROWS)
     if recorded is None:
         raise NotFoundError("trajectories of run", run, [])
-    return recorded.rows, plan, recorded.every
+    return plan, recorded
 
 
 def _column_lists(columns: ActorCounts | SpeedCurve | SpeedShares) -> dict[str, list[float | None]]:
