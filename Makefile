@@ -99,6 +99,7 @@ test-lowest: $(READY) $(PAGE)
 # The same with the newest ones, on Pythons that are on this machine.
 test-newest: $(READY) $(PAGE)
 	$(BIN)/python -m tools.try_versions newest 3.12 3.13
+	ODSCEN_SLOW=all $(BIN)/python -m pytest -q -rs tests/cli/test_two_pythons.py
 
 # The wheel from a clone of what is committed, on a machine without Node.
 check-wheel: $(READY)
