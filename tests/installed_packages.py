@@ -40,8 +40,8 @@ def install(
     entry_points: dict[str, dict[str, str]],
 ) -> None:
     """Put a module and its entry points on the path of this process and of those it starts."""
-    (group,) = entry_points.values()
-    module = next(iter(group.values())).partition(":")[0]
+    first = next(iter(entry_points.values()))
+    module = next(iter(first.values())).partition(":")[0]
     info = folder / f"{module}-1.0.dist-info"
     info.mkdir(parents=True)
     (folder / f"{module}.py").write_text(code, encoding="utf-8")
