@@ -84,7 +84,7 @@ REMARKS: Final = {
     "RelativeSpeedToMaster": ("approximated", "relative to the last speed that the file gives"),
     "RelativeTargetSpeed": ("approximated", "relative to the last speed that the file gives"),
     "AbsoluteTargetLane": ("approximated", "from the last lane that the file names"),
-    "FollowTrajectoryAction": ("approximated", "followed by the front, from where the actor is"),
+    "FollowTrajectoryAction": ("approximated", "from where the actor is"),
     "InRoutePosition": ("approximated", "along the lane of the first waypoint"),
     "RouteRef": ("approximated", "along the lane of the first waypoint"),
     "Waypoint": ("approximated", "the last one is the goal"),

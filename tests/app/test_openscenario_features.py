@@ -587,3 +587,35 @@ def test_a_start_against_a_lane_without_an_opposite_one_is_said(
     text = re.sub(r"<RelativeLanePosition .*?/>", f"{start}</LanePosition>", scene())
     found = read(workspace, tmp_path, text)
     assert any("heads against it" in reason for reason in reasons(found, "approximated"))
+
+
+def test_who_follows_a_trajectory_at_a_negative_speed_reverses_along_it_far_beside_all_lanes(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    rows = "".join(
+        f'<Vertex time="0"><Position><RoadPosition roadId="0" s="{s}" t="30"/></Position></Vertex>'
+        for s in (200, 100)
+    )
+    shape = f"<Shape><Polyline>{rows}</Polyline></Shape>"
+    follow = (
+        '<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name="t" '
+        f'closed="false">{shape}</Trajectory></TrajectoryRef><TimeReference><None/></TimeReference>'
+        '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction>'
+        "</RoutingAction></PrivateAction>"
+    )
+    text = scene().replace('value="${$kph / 3.6}"/>', 'value="-2"/>')
+    place = '<LanePosition roadId="0" laneId="-1" s="48.6"/>'
+    start = '<RoadPosition roadId="0" s="200" t="30"><Orientation type="absolute" h="0"/>'
+    text = text.replace(place, f"{start}</RoadPosition>")
+    text = text.replace("</SpeedAction></LongitudinalAction></PrivateAction></Private>",
+        f"</SpeedAction></LongitudinalAction></PrivateAction>{follow}</Private>", 1)  # fmt: skip
+    text = re.sub(r"<RelativeLanePosition .*?/>", place, text)
+    found = read(workspace, tmp_path, text)
+    done = run(workspace, found.scenario, settings=RunSettings(until=5.0), name="r", out=tmp_path)
+    rows = done.trajectories().sort("time")
+    ego = rows.filter(rows["id"] == "Ego", rows["time"] > 0.15)
+    # The centre is 1.4 m ahead of the reference point, which begins at 200 m.
+    assert ego["x"].to_numpy() == pytest.approx(201.4 - 2.0 * ego["time"].to_numpy(), abs=0.02)
+    assert ego["y"].to_numpy() == pytest.approx(30.0, abs=0.01)
+    assert np.cos(ego["hdg"].to_numpy()).min() > 0.999
+    assert "backwards along its trajectory, at a positive speed" in reasons(found, "approximated")

@@ -69,8 +69,9 @@ def test_one_that_begins_at_itself_is_metres_ahead_and_to_its_left(
     assert found.lists["refused"] == []
     path: dict[str, Any] = rule(found, "swerve")["then"][0]["path"]
     assert path["relative_to"] == "Ego"
-    # The reference point is 1.4 m behind the centre, the front 3.9 m ahead of it.
-    assert path["points"][-1] == [pytest.approx(60 - 1.4 + 3.9), pytest.approx(3.0)]
+    # The reference point, which follows it, is 1.4 m behind the centre and 3.9 m behind the front.
+    assert path["points"][-1] == [pytest.approx(60 - 1.4), pytest.approx(3.0)]
+    assert path["behind"] == pytest.approx(3.9)
 
 
 @pytest.mark.slow
@@ -92,7 +93,7 @@ def test_a_spline_without_a_start_begins_at_the_actor(workspace: Workspace, tmp_
     found = read(workspace, tmp_path, of_the_ego(spline))
     path = rule(found, "swerve")["then"][0]["path"]
     assert path["relative_to"] == "Ego"
-    assert path["points"][-1] == [pytest.approx(12 - 1.4 + 3.9), pytest.approx(0.0)]
+    assert path["points"][-1] == [pytest.approx(12 - 1.4), pytest.approx(0.0)]
 
 
 @pytest.mark.parametrize(

@@ -3222,7 +3222,8 @@ export interface components {
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
          *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
-         *     where it is and heads at the begin.
+         *     where it is and heads at the begin. Of a vehicle the point that is so many metres ``behind`` the
+         *     middle of its front is led along the line; ``backwards`` it heads against it.
          */
         "PathFollowing-Input": {
             points: (string | [
@@ -3235,6 +3236,10 @@ export interface components {
             /** @default [] */
             times?: number[];
             relative_to?: string | null;
+            /** @default 0 */
+            behind?: number;
+            /** @default false */
+            backwards?: boolean;
         };
         /**
          * @description Follow a line over the ground from where the actor is, through ``points``.
@@ -3242,7 +3247,8 @@ export interface components {
          *     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
          *     the begin at which it is there; none of them leaves the speed as it is.
          *     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
-         *     where it is and heads at the begin.
+         *     where it is and heads at the begin. Of a vehicle the point that is so many metres ``behind`` the
+         *     middle of its front is led along the line; ``backwards`` it heads against it.
          */
         "PathFollowing-Output": {
             points: (string | [
@@ -3255,6 +3261,10 @@ export interface components {
             /** @default [] */
             times: number[];
             relative_to: string | null;
+            /** @default 0 */
+            behind: number;
+            /** @default false */
+            backwards: boolean;
         };
         /** @description A state for so many seconds of the cycle; ``stage`` is empty if it is none's green. */
         PhaseInfo: {

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, Final, Protocol
+import re
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 from odscen.base.categories import Category
 from odscen.formats.openscenario.dialect import xml
@@ -29,8 +30,36 @@ _JUMP: Final = 0.1
 """Seconds that a recording takes which only puts an actor somewhere."""
 _RUN_UP: Final = 0.1
 """Metres by which a line begins before its first point, of who is elsewhere by then."""
+_ON_IT: Final = 1e-3
+"""Metres from a path at which a point is on it."""
 _STAYS: Final = frozenset({"appear", "stop", "brake", "lights", "horn", "signal", "ignore"})
 """Actions after which a standing actor is where it was, or where it appears."""
+
+
+class TrackedPoint(NamedTuple):
+    """Metres behind its front of the point of a vehicle on a path, and whether it is reversed."""
+
+    behind: float = 0.0
+    backwards: bool = False
+
+
+_TRACKED: Final = re.compile(r", (-?[\d.]+) m behind the front(, backwards)?$")
+
+
+def name_of_path(name: str, tracked: TrackedPoint) -> str:
+    """Name of a trajectory that says which point of a vehicle follows it, if not the front."""
+    if tracked == TrackedPoint():
+        return name
+    back = ", backwards" if tracked.backwards else ""
+    return f"{name}, {tracked.behind!r} m behind the front{back}"
+
+
+def tracked_point(name: str) -> TrackedPoint:
+    """Inverse of :func:`name_of_path`."""
+    found = _TRACKED.search(name)
+    if found is None:
+        return TrackedPoint()
+    return TrackedPoint(float(found[1]), backwards=bool(found[2]))
 
 
 class ActionWriter(Protocol):
@@ -97,12 +126,17 @@ def follow_line(
 
 
 def path(made: ActionWriter, part: Any, actor: str, where: str) -> list[_Element]:
-    """Trajectory of the reference point of an actor whose front follows a path."""
+    """Trajectory of the reference point of an actor, a point of which follows a path."""
     spots, times = _spots_of_path(made, part), list(part.times or ())
     base = part.relative_to and made.actors.get(part.relative_to)
     own = made.actors[actor]
     walks = own.category is Category.PEDESTRIAN
+    tracked = TrackedPoint() if walks else TrackedPoint(part.behind, part.backwards)
     front = 0.0 if walks else made.places.centre_ahead(own) + made.places.body(own).length / 2.0
+    front -= tracked.behind
+    if tracked.backwards:  # along the line the reference point is then on the other side
+        front = -front
+        made.notes.approximated.append((where, "it is driven forwards there"))
     begin = _start_of_path(made, part, actor)
     if base:
         begin = GroundPose(0.0, 0.0, 0.0, 0.0).back(made.places.centre_ahead(base))
@@ -115,7 +149,7 @@ def path(made: ActionWriter, part: Any, actor: str, where: str) -> list[_Element
     if begin is None:
         line = [line[1].back(_RUN_UP), *_add_headings(spots)]
         made.notes.approximated.append((where, "the actor is put to its first point"))
-    if begin is None or front > 0.0:
+    if begin is None or abs(front) > _ON_IT:
         made.notes.approximated.append((where, "the reference point follows, not the front"))
     vertices = [begin or line[0].back(front), *(spot.back(front) for spot in line[1:])]
     if base:
@@ -124,7 +158,7 @@ def path(made: ActionWriter, part: Any, actor: str, where: str) -> list[_Element
             RelativePose(vertex.x + ahead, vertex.y, 0.0, vertex.hdg, base.id)
             for vertex in vertices
         ]
-    name = f"{actor}: {where}"
+    name = name_of_path(f"{actor}: {where}", tracked)
     if times:
         before = 0.0 if begin is not None else 0.99 * times[0]
         return [made.trajectory(name, vertices, [before, *times], timed=True)]

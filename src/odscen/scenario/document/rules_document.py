@@ -338,7 +338,8 @@ class PathFollowing(Part):
     ``speed`` is that of all of it, ``speeds`` are those at the points, ``times`` the seconds after
     the begin at which it is there; none of them leaves the speed as it is.
     With ``relative_to`` an actor, ``points`` are metres ahead and to the left of its centre, by
-    where it is and heads at the begin.
+    where it is and heads at the begin. Of a vehicle the point that is so many metres ``behind`` the
+    middle of its front is led along the line; ``backwards`` it heads against it.
     """
 
     points: Annotated[tuple[RulePlace, ...], Field(min_length=1, max_length=10_000)]
@@ -346,6 +347,8 @@ class PathFollowing(Part):
     speeds: Annotated[tuple[RuleSpeed, ...], Field(max_length=10_000)] = ()
     times: Annotated[tuple[Positive, ...], Field(max_length=10_000)] = ()
     relative_to: Identifier | None = None
+    behind: Annotated[float, Field(ge=-10, le=30, allow_inf_nan=False)] = 0.0
+    backwards: bool = False
 
     @model_validator(mode="after")
     def _metres_from_it(self) -> Self:

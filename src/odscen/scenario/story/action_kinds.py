@@ -109,7 +109,9 @@ def _leave_or_stay(place: RulePlace, acting_actor: ActingActor) -> None:
 
 
 def follow_path(part: PathFollowing, acting_actor: ActingActor) -> float:
-    """Begin to follow a drawn path; the front of a vehicle is on it, the centre of a person.
+    """Begin to follow a drawn path; the centre of a person is on it, the front of a vehicle.
+
+    Or the point of the vehicle that is ``behind`` it.
 
     Raises
     ------
@@ -118,7 +120,9 @@ def follow_path(part: PathFollowing, acting_actor: ActingActor) -> float:
         is not on the road.
     """
     points = _points_of_path(part, acting_actor)
-    line = (_own_point(acting_actor), *points)
+    person = acting_actor.actor.person
+    behind, backwards = (0.0, False) if person else (part.behind, part.backwards)
+    line = (_own_point(acting_actor, behind), *points)
     if line_length(line) < 1e-6:
         return acting_actor.instant
     channel = acting_actor.channel
@@ -131,15 +135,19 @@ def follow_path(part: PathFollowing, acting_actor: ActingActor) -> float:
         )
         table = SpeedTable(acting_actor.instant, knots)
         channel.take_speed(table, acting_actor.owner)
-        channel.take_line(line, 0.0, None, acting_actor.owner, acting_actor.instant)
-        return table.end
-    if acting_actor.actor.person or part.speed is not None:
+        end = table.end
+    elif person or part.speed is not None:
         _along_line(line, part.speed, acting_actor)
+        end = math.inf
     elif acting_actor.speed > 0.0 or channel.law is not None:
-        channel.take_line(line, 0.0, None, acting_actor.owner, acting_actor.instant)
+        end = math.inf
     else:
         raise CannotAct("it is stopped; the path has to say how fast it is followed")
-    return math.inf
+    channel.take_line(
+        line, 0.0, None, acting_actor.owner, acting_actor.instant,
+        behind=behind, backwards=backwards,
+    )  # fmt: skip
+    return end
 
 
 def _points_of_path(part: PathFollowing, acting_actor: ActingActor) -> list[Point]:
@@ -247,10 +255,11 @@ def _row_at(rows: tuple[TrajectoryRow, ...], times: _Times, time: float) -> Traj
     return time, x0 + (x1 - x0) * share, y0 + (y1 - y0) * share, h0 + turn * share
 
 
-def _own_point(acting_actor: ActingActor) -> Point:
-    x, y = acting_actor.spot()
-    half = 0.0 if acting_actor.actor.person else acting_actor.actor.length / 2.0
-    return x + half * math.cos(acting_actor.actor.hdg), y + half * math.sin(acting_actor.actor.hdg)
+def _own_point(acting_actor: ActingActor, behind: float) -> Point:
+    """Where the centre of a person is, or the point so far behind the front of a vehicle."""
+    (x, y), hdg = acting_actor.spot(), acting_actor.actor.hdg
+    ahead = 0.0 if acting_actor.actor.person else acting_actor.actor.length / 2.0 - behind
+    return x + ahead * math.cos(hdg), y + ahead * math.sin(hdg)
 
 
 def _time_of_legs(legs: list[float], times: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
@@ -688,8 +697,7 @@ def _on_line(actor: ActorView, place: RulePlace, view: RoadView, channel: Channe
     if channel.line is None or channel.held:  # what is held stands, whatever line that is on
         return None
     there = beside(channel.line, view.place(place))
-    centre = channel.along - (0.0 if actor.person else actor.length / 2.0)
-    rest = there.along - centre
+    rest = there.along - channel.centre_along(actor)
     near = abs(there.left) < _BY and there.along < line_length(channel.line) + _BY
     return rest if near and rest > -_BY else None
 
@@ -932,6 +940,8 @@ ACTIONS = {
         ActionKind(
             "path", "follow a line over the ground through `points`, with one `speed`, `speeds` at "
             "the points or `times` at which it is there; SUMO leads a vehicle on from its end. "
+            "The point so many metres `behind` the front of a vehicle is on the line; `backwards` "
+            "the vehicle heads against it. "
             "Points are metres ahead and left of the actor `relative_to`, if it is given, "
             "by where that is at the begin",
             "m/s, s", "`moveToXY`", "FollowTrajectoryAction (Polyline)", _MIRRORED, follow_path,

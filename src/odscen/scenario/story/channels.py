@@ -94,6 +94,9 @@ class Channel:
         Where it is moved along: how far it has come, metres, and the offset.
     headings
         Where the actor looks at each point of the line; along the line without.
+    behind, backwards
+        How far behind the front of a vehicle the point is that is on the line, metres, and whether
+        it heads against it.
     held
         Whether a person stays at the end of its line.
     leaves
@@ -114,6 +117,8 @@ class Channel:
     headings: tuple[float, ...] | None = None
     along: float = 0.0
     side: SideLaw | None = None
+    behind: float = 0.0
+    backwards: bool = False
     held: bool = False
     leaves: bool = False
     settles: bool = False
@@ -199,9 +204,12 @@ class Channel:
         instant: float,
         *,
         headings: tuple[float, ...] | None = None,
+        behind: float = 0.0,
+        backwards: bool = False,
     ) -> None:
         """Lead the actor along a line, on which it has come ``along`` metres at ``instant``."""
         self.line, self.side, self.line_owner, self.headings = line, side, owner, headings
+        self.behind, self.backwards = behind, backwards
         self.held = self.leaves = self.rejoins = False
         # What is covered in this step before the instant is added at its end.
         self.along = along - self.metres(self._laws[0][0], instant)
@@ -213,6 +221,7 @@ class Channel:
     def release_line(self) -> None:
         """Leave the line."""
         self.line = self.side = self.line_owner = self.headings = None
+        self.behind, self.backwards = 0.0, False
         self.held = self.leaves = False
         if self.by_story:
             self.borrowed, self.exact = False, True
@@ -280,6 +289,11 @@ class Channel:
         self.rejoins, self.goal = False, None
         return move
 
+    def centre_along(self, actor: ActorView) -> float:
+        """Metres along the line at which the centre of an actor's body is."""
+        ahead = 0.0 if actor.person else self.behind - actor.length / 2.0
+        return self.along + (-ahead if self.backwards else ahead)
+
     def _pose_at(self, instant: float, *, person: bool) -> Pose:
         line = self.line or ()
         left = self.side.offset(instant) if self.side else 0.0
@@ -289,7 +303,9 @@ class Channel:
             return Pose(found.x, found.y, heading_on(line, self.headings, along))
         speed = self.speed(instant)
         turned = math.atan2(self.side.sideways(instant), speed) if self.side and speed else 0.0
-        return Pose(found.x, found.y, found.hdg + turned)
+        hdg = found.hdg + turned + (math.pi if self.backwards else 0.0)
+        ahead = self.behind
+        return Pose(found.x + ahead * math.cos(hdg), found.y + ahead * math.sin(hdg), hdg)
 
     def state(self) -> dict[str, Any]:
         """What has to be remembered, for JSON."""

@@ -381,3 +381,34 @@ def test_what_is_to_appear_beside_all_lanes_appears_where_it_is_placed_with_a_wo
     assert said.detail.startswith("it appears where it is placed, as 500, ")
     first = found.tracks["van"]
     assert first.centre(float(first.time[0]))[0] == pytest.approx(370.0, abs=3.0)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_point_behind_the_front_is_on_the_path_and_its_speed_is_that_of_the_point(
+    tmp_path: Path, backwards: bool
+) -> None:
+    # A quarter of a circle of 12 m, as a line of steps of 1 degree, to the left of the direction.
+    way = -1.0 if backwards else 1.0
+    begin = 372.0 - way * 5.0
+    turns = np.radians(np.arange(1.0, 91.0))
+    circle = [
+        (begin + way * 12.0 * math.sin(a), MIDDLE + 12.0 * (1.0 - math.cos(a))) for a in turns
+    ]
+    path = {"points": [[begin, MIDDLE], *map(list, circle)], "behind": 3.5, "backwards": backwards,
+            "speed": 5.0}  # fmt: skip
+    actors = [fast("van", 370.0, MIDDLE, 5.0, driver="story")]
+    found = run(document(MOTORWAY, actors, [after(0.0, {"path": path})], step=0.1), tmp_path / "r")
+    van, end = found.tracks["van"], found.instant("r", "ended")
+    inside = (van.time > 2.0) & (van.time < end)
+    x, y, hdg = van.x[inside], van.y[inside], van.hdg[inside]
+    point_x, point_y = x - 3.5 * np.cos(hdg), y - 3.5 * np.sin(hdg)
+    away = np.hypot(point_x - begin, point_y - (MIDDLE + 12.0))
+    assert len(away) > 15
+    assert away == pytest.approx(12.0, abs=0.01)
+    # It heads along the tangent, or against it.
+    turned = np.arctan2(way * (point_x - begin), MIDDLE + 12.0 - point_y)
+    wanted = turned if not backwards else -turned
+    assert np.cos(hdg - wanted).min() > math.cos(math.radians(1.0))
+    # The point goes at 5 m/s, the front faster.
+    arcs = 12.0 * turned
+    assert np.diff(arcs) / np.diff(van.time[inside]) == pytest.approx(5.0, abs=0.1)

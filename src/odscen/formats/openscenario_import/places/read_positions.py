@@ -323,7 +323,7 @@ class PositionReader:
         if found is None:
             raise RefusedError(kind, f"the map has no road {road!r}")
         point = MapPoint(*found)
-        return point if t < 0 else point._replace(hdg=point.hdg + math.pi)
+        return point if t <= 0 else point._replace(hdg=point.hdg + math.pi)
 
     def _read_road_position(self, kind: _Element) -> MapPoint:
         s, t = self.report.number(kind, "s"), self.report.number(kind, "t", 0.0)

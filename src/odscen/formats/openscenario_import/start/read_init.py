@@ -201,8 +201,10 @@ class ActorPlaces:
         node = int(((walks.x - centre.x) ** 2 + (walks.y - centre.y) ** 2).argmin())
         return {"spawn": str(walk_node_id(self._positions.graph, node))}
 
-    def aside(self, entity: ReadEntity, centre: MapPoint) -> float:
+    def aside(self, entity: ReadEntity, centre: MapPoint, *, led: bool) -> float:
         """Metres to the left of the nearest lane that leads its way, 0 on a lane.
+
+        ``led`` says whether it follows a trajectory from there, which needs no lane.
 
         Raises
         ------
@@ -213,7 +215,7 @@ class ActorPlaces:
         left = float(positions.beside_lane(centre))
         if abs(left) <= float(lanes.width[positions.node_near(centre)]) / 2:
             return 0.0
-        if entity.obstacle or abs(left) > _BESIDE:
+        if entity.obstacle or (abs(left) > _BESIDE and not led):
             raise RefusedError(entity.element, f"it starts {abs(left):.1f} m beside any lane")
         words = f"on the lane {abs(left):.1f} m beside at first, and there 0.1 s later"
         self._report.mark(entity.element, "approximated", words)
@@ -228,20 +230,27 @@ class ActorPlaces:
         lanes = self._positions.graph.lanes
         hdg, speed = float(lanes.hdg[self._positions.node_near(centre)]), made["initial_speed"]
         then = sorted(then, key=lambda action: "path" in action)  # as fast as the speed is by then
-        across = bool(left) or math.cos(centre.hdg - hdg) < _ALONG
-        if "path" in then[-1] and across:
+        far = abs(made["lateral_offset"]) > _BESIDE  # on a lane as wide as a test ground
+        across = bool(left) or far or math.cos(centre.hdg - hdg) < _ALONG
+        traced = isinstance(centre.x, TracedNumber) or isinstance(centre.y, TracedNumber)
+        if "path" in then[-1] and across and (left or not traced):
             made["lateral_offset"] = 0.0
-            then = [put_there(centre, speed), *then]
+            back = then[-1]["path"].get("backwards", False)
+            then = [put_there(centre, -speed if back else speed), *then]
         elif left:
             made["lateral_offset"] = 0.0
             then = [{"offset": {"to": round(left, 3), "over": 0.1}}, *then]
-        if isinstance(centre.x, TracedNumber) or isinstance(centre.y, TracedNumber):
+        if traced:
             # On its lane: its offset counts from there, and not from the lane that it is to be on.
             x, y = centre.x + left * math.sin(hdg), centre.y - left * math.cos(hdg)
             then = [{"appear": {"at": [x, y, hdg], "speed": speed}}, *then]
         return then
 
-    def vehicle(self, entity: ReadEntity, centre: MapPoint) -> dict[str, Any]:
+    def is_near_lane(self, centre: MapPoint) -> bool:
+        """Whether a vehicle can start on the nearest lane and be beside it."""
+        return abs(float(self._positions.beside_lane(centre))) <= _BESIDE
+
+    def vehicle(self, entity: ReadEntity, centre: MapPoint, *, led: bool = False) -> dict[str, Any]:
         """Node nearest to the centre of the body, and the offsets from it."""
         graph, lanes = self._positions.graph, self._positions.graph.lanes
         node = self._positions.node_near(centre)
@@ -254,7 +263,10 @@ class ActorPlaces:
             words = f"{abs(along):.2f} m along its lane from there, where that begins or ends"
             self._report.mark(entity.element, "approximated", words)
             ahead = 0.0
-        if math.cos(centre.hdg - hdg) < 0.0:
+        if abs(left) > _BESIDE:
+            words = f"on the lane {abs(left):.1f} m beside at first, and there 0.1 s later"
+            self._report.mark(entity.element, "approximated", words)
+        if math.cos(centre.hdg - hdg) < 0.0 and not led:
             words = "it drives the way of its lane: it heads against it, and no other one is near"
             self._report.mark(entity.element, "approximated", words)
         goal = self._positions.along(node, _FAR)
@@ -267,6 +279,8 @@ class ActorPlaces:
 
 
 # ----------------------------------------------------------------------------- what is at first
+_STANDS: Final = 1e6
+"""Seconds for which who stands far beside all lanes is held there, unless the story moves it."""
 _SAME_PLACE: Final = 0.05
 _SAME_SPEED: Final = 1e-4
 """Metres and m/s within which a file says what the properties of an actor do."""
@@ -466,6 +480,10 @@ class InitReader:
             speed = self._story.actions.speeds.get(kept[-1], 0.0)  # ... of whom it keeps a gap to
         # What takes time begins from a standstill, which entities are at before the first action.
         first = speed if all(change.get("shape") == "step" for change in changes) else 0.0
+        led = [action["path"] for action in then if "path" in action]
+        if self._story.actions is not None and entity.id in self._story.actions.reversing:
+            for path in led:
+                path["backwards"] = True
         made: dict[str, Any] = {"id": entity.id, "category": str(entity.category)}
         if entity.sized:
             made["size"] = entity.body._asdict()
@@ -478,8 +496,10 @@ class InitReader:
             if not late:
                 then = [{"appear": {"at": [centre.x, centre.y, centre.hdg]}}, *then]
         else:
-            left = self._places.aside(entity, centre)
-            made |= self._places.vehicle(entity, centre) | {"style": STEADY, "initial_speed": first}
+            stands = not (speed or led or entity.obstacle or self._places.is_near_lane(centre))
+            left = self._places.aside(entity, centre, led=stands or bool(led))
+            made |= self._places.vehicle(entity, centre, led=stands or bool(led))
+            made |= {"style": STEADY, "initial_speed": first}
             goals = [action["goal"]["to"] for action in then if "goal" in action]
             made |= {"goal": self._places.reached(entity, made, goals[-1])} if goals else {}
             drivers = [action["drive"]["by"] for action in then if "drive" in action]
@@ -488,7 +508,11 @@ class InitReader:
             then = [action for action in then if "goal" not in action and "drive" not in action]
             if not changes and not kept:
                 then.append({"speed": {"to": 0.0, "shape": "step"}})
-            then = self._places.at_first(centre, left, then, made)
+            if stands:
+                made["lateral_offset"] = 0.0
+                then = [put_there(centre, 0.0, seconds=_STANDS)]
+            else:
+                then = self._places.at_first(centre, left, then, made)
         if entity.ego:
             made["ego"] = True
         if speed > 0:

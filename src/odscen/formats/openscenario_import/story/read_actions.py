@@ -108,7 +108,7 @@ class ActionReader:
     """Reads actions of one entity after another.
 
     ``speeds`` (m/s), ``lanes`` (ids) and ``offsets`` (m) are the last ones that each actor was
-    asked for. ``own``
+    asked for; ``reversing`` are those that follow a trajectory at first at a negative one. ``own``
     says whether odscen wrote the file: its controllers are what drives without rules.
     """
 
@@ -117,6 +117,7 @@ class ActionReader:
     lanes: dict[str, int] = field(default_factory=dict)
     offsets: dict[str, float] = field(default_factory=dict)
     own: bool = False
+    reversing: set[str] = field(default_factory=set)
 
     def actions(self, element: _Element, entity: ReadEntity) -> list[Made]:
         """Actions of a rule that a ``PrivateAction`` is; none if it is ignored.
@@ -149,8 +150,8 @@ class ActionReader:
             return [{"offset": {"to": 0.0, "over": JUMP}}]
         return [make(self, kind, entity)]
 
-    def absolute_speed(self, target: _Element) -> float:
-        """Speed that a target asks for, m/s; a relative one counts from the last one known."""
+    def absolute_speed(self, target: _Element, actor: str) -> float:
+        """Speed that a target asks of an actor, m/s; a relative one counts from the last known."""
         report = self.conditions.report
         kind = report.only(target)
         value = report.number(kind, "value")
@@ -159,8 +160,15 @@ class ActionReader:
             words = f"relative to {base:g} m/s, the last speed that the file gives"
             report.mark(kind, "approximated", words)
             value = base * value if kind.get("speedTargetValueType") == "factor" else base + value
+        private = next(target.iterancestors("Private"), None)
+        led = private is not None and private.find(".//FollowTrajectoryAction") is not None
+        if value < 0 and led:
+            report.mark(kind, "approximated", "backwards along its trajectory, at a positive speed")
+            self.reversing.add(actor)
+            value = -value
         if value < 0:
-            report.mark(kind, "approximated", f"{value:g} m/s is 0: actors do not reverse")
+            words = f"{value:g} m/s is 0: actors reverse only along a trajectory at first"
+            report.mark(kind, "approximated", words)
         return min(max(value, 0.0), 100.0)
 
 
@@ -206,7 +214,7 @@ def _read_speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     target = report.child(kind, "SpeedActionTarget")
     if dynamics is None or target is None:
         raise RefusedError(kind, "a speed without dynamics or target")
-    to = read.absolute_speed(target)
+    to = read.absolute_speed(target, entity.id)
     shape, value = dynamics.get("dynamicsShape", "step"), report.number(dynamics, "value", 0.0)
     before = read.speeds.get(entity.id, 0.0)
     read.speeds[entity.id] = to
@@ -484,7 +492,7 @@ def _read_goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
 
 
 def _read_arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
-    return arriving(read.conditions, kind, entity, read.speeds)
+    return arriving(read.conditions, kind, entity, read.speeds, read.reversing)
 
 
 _MAKERS: Final[Mapping[str, Callable[[ActionReader, _Element, ReadEntity], Made]]] = {

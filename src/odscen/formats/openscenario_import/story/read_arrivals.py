@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.formats.openscenario_import.import_report import RefusedError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Container, Mapping
 
     from lxml.etree import _Element
 
@@ -19,11 +19,16 @@ Made = dict[str, Any]
 
 
 def arriving(
-    conditions: ConditionReader, kind: _Element, entity: ReadEntity, speeds: Mapping[str, float]
+    conditions: ConditionReader,
+    kind: _Element,
+    entity: ReadEntity,
+    speeds: Mapping[str, float],
+    reversing: Container[str],
 ) -> Made:
     """Action of a rule that a ``SynchronizeAction`` is.
 
-    ``speeds`` are the last ones that actors were asked for, m/s.
+    ``speeds`` are the last ones that actors were asked for, m/s; ``reversing`` those that head
+    against their trajectories.
 
     Raises
     ------
@@ -42,7 +47,9 @@ def arriving(
         place = report.child(kind, tag)
         if place is None:
             raise RefusedError(kind, f"{kind.tag} without {tag}")
-        found[field_name] = conditions.point_or_node(place, ahead=who.ahead)
+        against = who.id in reversing and place.find("TrajectoryPosition") is not None
+        ahead = -who.ahead if against else who.ahead
+        found[field_name] = conditions.point_or_node(place, ahead=ahead)
     words = "how its speed goes on the way is not in the standard: players differ by up to 1 m"
     report.mark(kind, "approximated", words)
     found |= _on_arrival(conditions.report, kind, conditions.entities[name].id, speeds)

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.categories import Category
+from odscen.formats.openscenario.xosc_lines import TrackedPoint, tracked_point
 from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.places.map_points import MapPoint, MovingFrame
 from odscen.formats.openscenario_import.places.read_trajectories import read_trajectory
@@ -25,12 +26,12 @@ JUMP: Final = 0.1
 """Seconds that a teleport takes."""
 
 
-def put_there(centre: MapPoint, speed: float) -> Made:
+def put_there(centre: MapPoint, speed: float, *, seconds: float = JUMP) -> Made:
     """Recording that puts the centre of an actor at a place, with its heading there."""
-    after = centre.moved(JUMP * speed)
+    after = centre.moved(seconds * speed)
     rows = [
         [time, round(float(at.x), 4), round(float(at.y), 4), round(float(at.hdg), 6)]
-        for time, at in ((0.0, centre), (JUMP, after))
+        for time, at in ((0.0, centre), (seconds, after))
     ]
     return {"replay": {"rows": rows}}
 
@@ -63,7 +64,9 @@ def lines_up(report: ImportReport, kind: _Element, names: Container[str]) -> boo
 
 
 def followed(conditions: ConditionReader, kind: _Element, entity: ReadEntity) -> Made:
-    """Path of the front of an actor along a trajectory.
+    """Path of the reference point of an actor along a trajectory.
+
+    Of a file of odscen it is that of the point which the name of the trajectory says.
 
     Raises
     ------
@@ -83,14 +86,24 @@ def followed(conditions: ConditionReader, kind: _Element, entity: ReadEntity) ->
                  for point in found]  # fmt: skip
         if base == own and math.cos(found[0].at.hdg) < 0.0:
             raise RefusedError(kind, "a trajectory that begins backwards: actors do not reverse")
+    how = _own_tracking(kind) if conditions.own else TrackedPoint(front, backwards=False)
+    ahead = front - how.behind
     vertices = [
         (point.time, round(at.x, 4), round(at.y, 4))
         for point in found
-        for at in (point.at.moved(front),)
+        for at in (point.at.moved(-ahead if how.backwards else ahead),)
     ]
-    report.mark(kind, "approximated", "followed by the front, from where the actor is")
-    relative = {} if base is None else {"relative_to": entities[base].id}
-    return {"path": _timed_points(conditions, kind, vertices[1:]) | relative}
+    report.mark(kind, "approximated", "followed from where the actor is")
+    path = _timed_points(conditions, kind, vertices[1:])
+    path |= {} if base is None else {"relative_to": entities[base].id}
+    path |= {"behind": round(how.behind, 4)} if how.behind else {}
+    path |= {"backwards": True} if how.backwards else {}
+    return {"path": path}
+
+
+def _own_tracking(kind: _Element) -> TrackedPoint:
+    line = next(kind.iter("Trajectory"), None)
+    return tracked_point("" if line is None else line.get("name", ""))
 
 
 def _timed_points(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -384,11 +385,12 @@ class StoryReader:
         RefusedError
             If that is out of the bounds of rules; names the element, which is that of the actor.
         """
-        first, rest = then[:1], then[1:]
-        if first and {"appear", "replay", "offset"} & first[0].keys():
+        if then and {"appear", "replay", "offset"} & then[0].keys():
             self._placed.add(actor)
-        if rest and ("appear" in first[0] or "replay" in first[0]):
-            groups = [[*first, *(rest if len(rest) == 1 else [{"together": rest}])]]
+        put = list(itertools.takewhile(lambda one: {"appear", "replay"} & one.keys(), then))
+        rest = then[len(put) :]
+        if put and rest:
+            groups = [[*put, *(rest if len(rest) == 1 else [{"together": rest}])]]
         else:
             groups = [action.get(FOLLOWING, [action]) for action in then]
         made = [{"actor": actor, "when": ALWAYS, "then": group} for group in groups]

@@ -21,6 +21,8 @@ _STANDING = 0.1
 """m/s below which a road user stands."""
 _USUAL_WALK = 1.39
 """m/s at which pedestrians walk, see :data:`odscen.sumo.realize.driving.KINDS`."""
+_FASTEST = 110.0
+"""m/s, more than any speed that a rule can say."""
 _ON_LANE = 1.5
 """Metres from its centre line in which a place is on a lane."""
 _ABREAST = 6.0
@@ -74,6 +76,7 @@ class StoryView:
         self._gone: set[str] = set()
         self._eager: tuple[str, ...] | None = None
         self._travelled: dict[str, float] = {}
+        self._odometers: dict[str, tuple[float, float, float]] = {}
         self._standing: dict[str, float] = {}
         self._last: dict[str, tuple[float, float, float]] = {}
 
@@ -213,6 +216,7 @@ class StoryView:
         """What has to be remembered, for JSON."""
         return {
             "travelled": self._travelled,
+            "odometers": {name: list(one) for name, one in self._odometers.items()},
             "standing": self._standing,
             "gone": sorted(self._gone),
             "last": {name: list(one) for name, one in self._last.items()},
@@ -222,6 +226,8 @@ class StoryView:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
         self._travelled = dict(state["travelled"])
+        odometers = state.get("odometers", {}).items()
+        self._odometers = {name: (t, metres, jumped) for name, (t, metres, jumped) in odometers}
         self._standing = dict(state["standing"])
         self._gone = set(state["gone"])
         self._last = {name: (x, y, v) for name, (x, y, v) in state["last"].items()}
@@ -248,7 +254,8 @@ class StoryView:
         seen = self._road.vehicle(planned.id)
         if seen is None:
             return None
-        x, y, angle, speed, faster, travelled, lane, left = seen
+        x, y, angle, speed, faster, odometer, lane, left = seen
+        travelled = self._leave_out_jumps(planned.id, odometer)
         off_road = not lane or abs(left) > self._half_width(lane)
         return self._make_view(planned, x, y, angle, speed, faster, travelled, off_road=off_road)
 
@@ -264,6 +271,8 @@ class StoryView:
             return None
         x, y, before = self._last.get(planned.id, (seen.x, seen.y, seen.speed))
         moved = math.hypot(seen.x - x, seen.y - y)
+        if moved > _FASTEST * self._step:  # put somewhere else: no distance that it travels
+            moved = 0.0
         # SUMO says 0 of persons that are moved.
         speed = self._driven.get(planned.id, seen.speed)
         self._travelled[planned.id] = self._travelled.get(planned.id, 0.0) + moved
@@ -273,6 +282,14 @@ class StoryView:
             planned, seen.x, seen.y, seen.angle_deg, speed, faster, travelled,
             off_road=not seen.lane,
         )  # fmt: skip
+
+    def _leave_out_jumps(self, vehicle: str, odometer: float) -> float:
+        """Metres that a vehicle has travelled, without those by which it was put somewhere else."""
+        time, before, jumped = self._odometers.get(vehicle, (self._now - self._step, 0.0, 0.0))
+        if odometer - before > _FASTEST * (self._now - time + self._step):
+            jumped += odometer - before
+        self._odometers[vehicle] = self._now, odometer, jumped
+        return odometer - jumped
 
     def _make_view(
         self,
