@@ -455,9 +455,50 @@ def test_files_that_are_sent_together_are_a_project(project: Path, tmp_path: Pat
         )
 
 
+def test_options_that_change_what_happens_are_handed_on_or_said_not_to_be(
+    store: Workspace, project: Path
+) -> None:
+    (project / "options.sumocfg").write_text(
+        "<configuration><net-file>grid.net.xml</net-file><end>900</end><processing>"
+        '<default.departspeed value="max"/><device.toc.manualType value="car"/>'
+        '<device.stationfinder.rescueAction value="tow"/><no-internal-links value="true"/>'
+        '<collision.check-junctions.mingap value="0.5"/>'
+        '<tls.delay_based.detector-range value="80"/>'
+        '</processing><mesosim value="true"/><meso-tauff value="1.2"/><load-state value="s.xml"/>'
+        '<remote-port value="8813"/><device.ssm.probability value="1"/>'
+        '<weight-files value="w.xml"/>'
+        '<device.toc.file value="toc.xml"/></configuration>'
+    )
+    made = import_file(store, project / "options.sumocfg")
+    assert made.scenario is not None
+    assert made.scenario.simulation.duration == 900.0
+    assert made.scenario.sumo is not None
+    assert made.scenario.sumo.options == {
+        "default.departspeed": "max", "device.toc.manualType": "car",
+        "device.stationfinder.rescueAction": "tow", "no-internal-links": "true",
+        "collision.check-junctions.mingap": "0.5", "tls.delay_based.detector-range": "80",
+    }  # fmt: skip
+    said = {row.xpath: row.reason for row in made.lists["approximated"]}
+    assert "microscopic model" in said["option mesosim"]
+    assert "begins with an empty road" in said["option load-state"]
+    assert "by TraCI does not happen" in said["option remote-port"]
+    assert "travel times of files are not read" in said["option weight-files"]
+    assert {row.xpath for row in made.lists["ignored"]} == {
+        "option meso-tauff", "option device.ssm.probability", "option device.toc.file",
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("files", "words"),
     [
+        (
+            {"x.sumocfg": "<configuration><n value='n'/><end value='noon'/></configuration>"},
+            r"end: 'noon' is no time",
+        ),
+        (
+            {"x.sumocfg": "<configuration><net-file value='n'/><seed value='x'/></configuration>"},
+            r"seed: 'x' is no whole number",
+        ),
         ({"x.sumocfg": "<routes/>"}, "open the .sumocfg that names this file"),
         ({"x.sumocfg": "<duarouterConfiguration/>"}, "another program of SUMO"),
         ({"x.sumocfg": "<configuration><input/></configuration>"}, "names no net-file"),

@@ -53,6 +53,33 @@ _OWN: Final = frozenset((
     "time-to-teleport", "lateral-resolution", "default.action-step-length", "pedestrian.model",
 ))  # fmt: skip
 """Options that the scenario has as parts of its own."""
+_TIMES: Final = ("begin", "end", "step-length", "time-to-teleport", "lateral-resolution")
+_OTHERWISE: Final = (
+    (
+        re.compile("mesosim"), "approximated",
+        "each vehicle moves by SUMO's microscopic model, so times and queues are others than those "
+        "of its mesoscopic one",
+    ),
+    (re.compile("meso-.*"), "ignored", "of the mesoscopic model, which is not in use"),
+    (
+        re.compile("load-state.*"), "approximated",
+        "states are not loaded: the run begins with an empty road",
+    ),
+    (
+        re.compile("weight-files|astar.*distances?"), "approximated",
+        "travel times of files are not read: routes that SUMO finds are those of an empty road",
+    ),
+    (
+        re.compile("remote-port|num-clients"), "approximated",
+        "no other program steers the run: what it would do by TraCI does not happen",
+    ),
+    (
+        re.compile(r"device\.fcd-replay\..*"), "approximated",
+        "trajectories of files are not replayed",
+    ),
+    (re.compile(r"device\.ssm\..*"), "ignored", "odscen measures conflicts itself"),
+)  # fmt: skip
+"""Options that would change what happens and are not handed on: what becomes of them, and why."""
 _EMBEDS: Final = ("variableSpeedSign", "rerouter")
 """Elements whose ``file`` is read, and not written."""
 _ROOTS: Final = frozenset(("configuration", "sumoConfiguration", "sumoGuiConfiguration"))
@@ -91,6 +118,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
             file=source.file.where,
         )
     options = _options_of(root)
+    _check_numbers(options, source.file.where)
     net_name = options.get("net-file")
     if not net_name:
         raise InputError("the configuration names no net-file", file=source.file.where)
@@ -102,7 +130,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     programs = _take_programs(files, report)
     on_map = _bring_network(source, net_file, _unpack_content(net_file.read()), programs, report)
     begin = seconds_of(options.get("begin")) or 0.0
-    seed = int(float(options.get("seed") or SUMO_SEED))
+    seed = int(options.get("seed") or SUMO_SEED)
     scenario = _empty_scenario(source, on_map, max(0, min(seed, 2**31 - 1)), report)
     project = SumoProject(
         begin=begin,
@@ -143,9 +171,24 @@ def _options_of(root: etree._Element) -> dict[str, str]:
     for element in root.iter():
         if isinstance(element.tag, str) and element is not root:
             value = element.get("value", element.get("v"))
+            if value is None and not len(element) and not element.attrib:
+                value = (element.text or "").strip() or None  # <end>3600</end> is taken, too
             if value is not None:
                 found[_SHORT.get(element.tag, element.tag)] = value.strip()
     return found
+
+
+def _check_numbers(options: Mapping[str, str], file: str) -> None:
+    """Refuse times and a seed that are none."""
+    for name in _TIMES:
+        value = options.get(name)
+        if value and seconds_of(value) is None:
+            raise InputError(
+                f"{shown(value)} is no time: seconds, or h:m:s", element=name, file=file
+            )
+    seed = options.get("seed")
+    if seed and not re.fullmatch(r"[+-]?\d+", seed):
+        raise InputError(f"{shown(seed)} is no whole number", element="seed", file=file)
 
 
 def _read_files(
@@ -444,8 +487,12 @@ def _report_options(options: Mapping[str, str], report: ElementReport) -> None:
     for name, value in sorted(options.items()):
         if name in _OWN:
             continue
+        own = ((become, why) for pattern, become, why in _OTHERWISE if pattern.fullmatch(name))
+        become, why = next(own, ("", ""))
         if OPTIONS.fullmatch(name):
             report.add("taken", f"option {name}", f"{value}, handed on to SUMO")
+        elif become and value.lower() not in ("false", "0", "off", "no"):
+            report.add(become, f"option {name}", f"{value}: {why}")
         else:
             reason = f"{value}: it names a file, or shows something; odscen has outputs of its own"
             report.add("ignored", f"option {name}", reason)

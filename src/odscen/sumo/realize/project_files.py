@@ -34,22 +34,25 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.sumo_map import SumoMap
 
 OPTIONS: Final = re.compile(
-    r"default\.(speeddev|action-step-length|carfollowmodel|emergencydecel)"
+    r"default\.(speeddev|action-step-length|carfollowmodel|emergencydecel|departspeed|departlane)"
+    r"|no-internal-links|emergency-insert|keep-after-arrival|startup-wait-threshold|junction-taz"
     r"|step-method\.ballistic|extrapolate-departpos|threads|scale(-suffix)?"
     r"|random(-depart-offset)?|thread-rngs"
     r"|time-to-teleport\.[a-z.-]+|time-to-impatience|waiting-time-memory|max-depart-delay"
     r"|max-num-(vehicles|persons|teleports)|sloppy-insert|eager-insert|insertion-checks|route-steps"
-    r"|ignore-(route-errors|accidents|junction-blocker)|collision\.[a-z-]+"
+    r"|ignore-(route-errors|accidents|junction-blocker)|collision\.[a-z.-]+"
     r"|intermodal-collision\.[a-z-]+|emergencydecel\.[a-z-]+|parking\.maneuver|use-stop-(ended|started)"
-    r"|lanechange\.[a-z.-]+|overhead-wire\.[a-z-]+|tls\.[a-z.-]+|railsignal[a-z.-]*"
-    r"|pedestrian\.(striping\.[a-z.-]+|jupedsim\.[a-z.-]+|remote\.[a-z-]+)"
+    r"|lanechange\.[a-z.-]+|overhead-wire\.[a-z-]+|tls\.[a-z_.-]+|railsignal[a-z.-]*"
+    r"|railway\.max-train-length|slope-centered|replay-rerouting|weight-attribute"
+    r"|emissions\.volumetric-fuel|phemlight-(year|temperature)"
+    r"|pedestrian\.(striping\.[a-z.-]+|jupedsim\.[a-z.-]+|remote\.[a-z-]+|timegap-crossing)"
     r"|persontrip\.[a-z.-]+|ride\.stop-tolerance|mapmatch\.[a-z-]+"
-    r"|routing-algorithm|weights\.(random-factor|priority-factor|turnaround-penalty|minor-penalty"
+    r"|routing-algorithm|weights\.(random-factor(\.dynamic)?|reversal-penalty|priority-factor|turnaround-penalty|minor-penalty"
     r"|tls-penalty|separate-turns)|astar\.landmark-distance|routing-threads"
     r"|device\.(rerouting|emissions|battery|elechybrid|taxi|glosa|tripinfo|vehroute|bluelight|toc"
     r"|driverstate|stationfinder|friction|fcd|example|btreceiver|btsender|person-device)\."
-    r"(?!.*(file|output))[a-z0-9._-]+"
-    r"|person-device\.(?!.*(file|output))[a-z0-9._-]+"
+    r"(?!.*(file|output))[A-Za-z0-9._-]+"
+    r"|person-device\.(?!.*(file|output))[A-Za-z0-9._-]+"
 )
 """Options of SUMO that change what happens and name no file."""
 
