@@ -334,6 +334,31 @@ def test_whom_sumo_ignores_in_a_route_file_is_named_and_not_planned(
     ]
 
 
+def test_whom_a_calibrator_removes_as_they_depart_ends_no_run(
+    store: Workspace, project: Path
+) -> None:
+    (project / "few.rou.xml").write_text(
+        '<routes><route id="few" edges="A0B0 B0C0"/>'
+        '<flow id="f" route="few" begin="0" end="200" period="5"/></routes>'
+    )
+    (project / "few.add.xml").write_text(
+        '<additional><route id="own" edges="A0B0 B0C0"/><calibrator id="c" lane="A0B0_1" pos="5" '
+        'period="30" output="c.xml"><flow begin="0" end="200" route="own" vehsPerHour="100" '
+        'speed="10"/></calibrator></additional>'
+    )
+    (project / "few.sumocfg").write_text(
+        '<configuration><net-file value="grid.net.xml"/><route-files value="few.rou.xml"/>'
+        '<additional-files value="few.add.xml"/><end value="300"/></configuration>'
+    )
+    alone = run_of_sumo(project, "few.sumocfg", "few.add.xml", net="grid.net.xml")
+    made = import_file(store, project / "few.sumocfg")
+    assert made.scenario is not None
+    done = run(store, made.scenario, name="few")
+    arrived = done.events().filter(pl.col("kind") == "arrived")
+    assert 0.0 in {duration for _, duration in alone.trips.values()}  # who was removed at once
+    assert len(arrived) == len(alone.trips)
+
+
 def test_who_departs_before_the_simulation_begins_is_left_out_as_in_sumo(
     store: Workspace, project: Path
 ) -> None:

@@ -392,12 +392,13 @@ class Session:
     def _front_of(self, pose: tuple[Any, Any], name: str) -> Front | None:
         place, direction = pose
         try:
-            (x, y, z), angle = place(name), direction(name)
+            (x, y, *height), angle = place(name), direction(name)
         except self._errors:
             return None
-        if abs(x) > 1e8:  # SUMO's INVALID_DOUBLE_VALUE, -2^30: known, but not on the road
+        # SUMO's INVALID_DOUBLE_VALUE, -2^30, without a height: known, but not on the road.
+        if abs(x) > 1e8 or not height:
             return None
-        return Front(x, y, z, angle)
+        return Front(x, y, height[0], angle)
 
 
 _open = False
