@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from odscen.app.demand.calibration import calibrate
+from odscen.app.demand.calibration_knobs import program_knobs
 from odscen.app.demand.calibration_page import write_calibration_page
 from odscen.app.demand.plausible_calibration import doubts_of
 from odscen.app.demand.target_values import Measured, is_group_of, read_values
@@ -220,6 +221,16 @@ def test_what_is_not_plausible_is_said(workspace: Workspace) -> None:
     fair = {"validation_before": 1.0, "validation_after": 0.5}
     plausible = [target._replace(value=950.0) for target in flows]
     assert doubts_of(few, few, plausible, shown, shown, fair) == ()
+
+
+def test_greens_may_change_at_the_lights_that_targets_lie_at(workspace: Workspace) -> None:
+    roads, junction = ends_of(workspace)
+    scenario = crossing(workspace, [(roads[0], roads[1], 10.0)])
+    lights = load_map(workspace.map(CROSSING)).lights
+    at_light = [Target("queue", f"{roads[0]}>{junction}", 0, 900, 9)]
+    (knob,) = program_knobs(scenario, lights, at_light)
+    assert (knob.low, knob.start, knob.high) == (5.0, 13.0, 23.0)
+    assert not list(program_knobs(scenario, lights, [Target("flow", roads[0], 0, 900, 9)]))
 
 
 @pytest.mark.parametrize(

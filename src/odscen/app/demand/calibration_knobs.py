@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from odscen.base.errors import InputError, ScenarioError
+from odscen.lanegraph.segments import segment_name
 from odscen.scenario import edits
 from odscen.scenario.demand.scaled_demand import scalable, scaled
 from odscen.scenario.document.json_form import with_values
@@ -85,7 +86,8 @@ def program_knobs(
     """Greens of the lights that targets lie at; seconds go to the next stage or come from it."""
     junctions = {part for target in targets for part in target.place.split(">")}
     for light in lights:
-        junction = next((name for name in light.names if name in junctions), None)
+        named = (name for name in light.names if segment_name("junction", name) in junctions)
+        junction = next(named, None)
         if junction is None:
             continue
         _, timing = timing_of_light(scenario, lights, junction)
