@@ -71,7 +71,7 @@ _OTHERWISE: Final = (
     ),
     (
         re.compile("remote-port|num-clients"), "approximated",
-        "no other program steers the run: what it would do by TraCI does not happen",
+        "no other program takes part: what it would do by TraCI does not happen",
     ),
     (
         re.compile(r"device\.fcd-replay\..*"), "approximated",
