@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from odscen.app.demand.calibration import calibrate
+from odscen.app.demand.calibration import Calibration, calibrate
 from odscen.app.demand.calibration_knobs import program_knobs
 from odscen.app.demand.calibration_page import write_calibration_page
 from odscen.app.demand.plausible_calibration import doubts_of
@@ -17,6 +17,7 @@ from odscen.app.running.runs import run
 from odscen.base.errors import InputError
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings
+from odscen.scenario import edits
 from odscen.scenario.demand.targets import Target, hold_back, read_targets
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import MapReference, Scenario
@@ -139,6 +140,47 @@ def test_a_parameter_is_found_again_and_a_change_that_does_not_help_is_not_kept(
     assert "no target was held back, so nothing says whether the result holds elsewhere" in (
         done.doubts
     )
+
+
+def straight_on(workspace: Workspace) -> Scenario:
+    """Traffic that goes straight on from all sides, near what the greens carry."""
+    pairs = (("r1", "r3"), ("r3", "r1"), ("r2", "r4"), ("r4", "r2"))
+    return crossing(workspace, [(begin, end, 420.0) for begin, end in pairs])
+
+
+def approach_targets(workspace: Workspace, held: set[str]) -> list[Target]:
+    """Flows and queues of the approaches, of which some are held back."""
+    roads, junction = ends_of(workspace)
+    return [
+        Target(kind, f"{road}>{junction}", begin, end, 0.0, held=road in held)
+        for road in roads
+        for kind, begin, end in (
+            ("flow", 300.0, 600.0), ("flow", 600.0, 900.0), ("flow", 900.0, 1200.0),
+            ("queue", 300.0, 600.0),
+        )
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_headway_is_found_again_and_holds_at_approaches_held_back(workspace: Workspace) -> None:
+    start = straight_on(workspace)
+    truth = edits.set_drivers(start, headway=1.7)
+    targets = measure(workspace, truth, approach_targets(workspace, held={"r2", "r4"}))
+    done = calibrate(workspace, start, targets, change=["drivers"], seeds=[1], trials=9)
+    assert done.steps[0].what == "headway 1.4 s"
+    assert done.steps[0].kept
+    assert done.scenario.drivers.headway == pytest.approx(1.7, abs=0.2)
+    assert_fits_and_held_ones_improve(done)
+
+
+def assert_fits_and_held_ones_improve(done: Calibration) -> None:
+    """Distances of both parts, each by less than three quarters of what it was."""
+    of = done.distances
+    for before, after in (("before", "after"), ("validation_before", "validation_after")):
+        old, new = of[before], of[after]
+        assert old is not None
+        assert new is not None
+        assert new < 0.75 * old, (of, done.steps)
 
 
 def test_targets_are_read_with_their_lines() -> None:
