@@ -55,6 +55,12 @@ WHO = {
 }
 """Classes of SUMO for each road user of ``<access>`` that has some; cars of many are cars."""
 
+LEAST_STRETCH = 0.01
+"""Metres: nobody is on what is shorter, as where one edge is cut into two."""
+
+BESIDE = 0.5
+"""Metres before and behind a lane inside a junction, on those that it joins."""
+
 EVERYBODY = set[str]().union(*WHO.values())
 
 
@@ -223,13 +229,20 @@ def _compare_access(
         key, own = lanes.lane_keys[interval.lane], lanes.lane_list[interval.sumo]
         if not isinstance(key, LaneKey) or own.allowed == {"pedestrian"}:
             continue
-        lane = odr.roads[key.road].sections[key.section].lanes[key.lane]
-        if not lane.access:
+        section = odr.roads[key.road].sections[key.section]
+        lane = section.lanes[key.lane]
+        low, high = sorted((float(interval.s[0]), float(interval.s[-1])))
+        if not lane.access or high - low < LEAST_STRETCH:
             continue
+        places_beside = (max(low - BESIDE, section.s), min(high + BESIDE, section.s_end))
+        ends = [_stated_classes(lane.type, lane.access, s) for s in places_beside]
         for share in (0.02, 0.5, 0.98):
-            s = float(interval.s[0] + share * (interval.s[-1] - interval.s[0]))
+            s = low + share * (high - low)
             places += 1
             stated = _stated_classes(lane.type, lane.access, s)
+            if lanes.edges[own.edge].function == "internal":
+                # Who passes a junction of SUMO may use the lanes before and behind it.
+                stated = stated & ends[0] & ends[1]
             if {name for name in stated if name in permitted[own.id]} != stated or any(
                 name in permitted[own.id] for name in EVERYBODY - stated
             ):

@@ -86,6 +86,30 @@ def test_normalized_cubics_are_brought_to_metres() -> None:
     assert one == pytest.approx(other)
 
 
+@pytest.mark.parametrize(
+    ("inside", "same"),
+    [("10 2 1", "normalized"), ("1 0.002 0", "arcLength")],
+)
+def test_a_range_of_cubics_that_is_none_is_the_one_that_their_length_shows(
+    inside: str, same: str
+) -> None:
+    shape = '<paramPoly3 pRange="{}" aU="0" bU="{}" cU="0" dU="0" aV="0" bV="0" cV="{}" dV="{}"/>'
+    plan = '<geometry s="0" x="0" y="0" hdg="0" length="10.6">{}</geometry>'
+    odd, right = (
+        parse(document(road(length=10.6, plan=plan.format(shape.format(name, *inside.split())))))
+        for name in ("curve", same)
+    )
+    assert odd.roads["1"].geometry == right.roads["1"].geometry
+    assert any(f"pRange='curve' is read as {same}" in note for note in odd.notes)
+
+
+def test_a_range_of_cubics_that_fits_no_length_is_refused() -> None:
+    shape = '<paramPoly3 pRange="curve" aU="0" bU="4" cU="0" dU="0" aV="0" bV="0" cV="0" dV="0"/>'
+    plan = f'<geometry s="0" x="0" y="0" hdg="0" length="10">{shape}</geometry>'
+    with pytest.raises(OpenDriveError, match="is none of arcLength, normalized"):
+        parse(document(road(length=10.0, plan=plan)))
+
+
 def test_1_8_access_restrictions_are_read_like_older_ones() -> None:
     start = '<access sOffset="0" rule="deny"'
     new = f'{start}><restriction type="bus"/><restriction type="taxi"/></access>'

@@ -15,6 +15,7 @@ from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_furniture import parse_objects, parse_signals
 from odscen.opendrive.parse_lanes import open_sole_layer, parse_sections, permanent_lanes
 from odscen.opendrive.parse_rules import (
+    CURVE_TOLERANCE,
     MAX_COORDINATE,
     MAX_NUMBER,
     MAX_ROAD_LENGTH,
@@ -278,9 +279,9 @@ def _holding_a_point(element: Element, notes: Notes) -> Geometry | None:
         notes.add(Rule.ZERO_LENGTH, element, f"length is {length:g}; the geometry is left out")
         return None
     if not 0.0 < length <= SLIVER_LENGTH:
-        return _parse_geometry(element, s)
+        return _parse_geometry(element, s, notes)
     try:
-        return _parse_geometry(element, s)
+        return _parse_geometry(element, s, notes)
     except OpenDriveError as error:
         detail = f"{error.problem}; the geometry of {length:.3g} m is left out"
         notes.add(Rule.SLIVER, error.element or element, detail)
@@ -316,7 +317,7 @@ def _goes_on_behind(
     return True
 
 
-def _parse_geometry(element: Element, s: float) -> Geometry:
+def _parse_geometry(element: Element, s: float, notes: Notes) -> Geometry:
     shapes = [shape for shape in element if shape.tag != "userData"]
     if len(shapes) != 1:
         raise refusal(element, f"there are {len(shapes)} shapes where one must be")
@@ -326,7 +327,7 @@ def _parse_geometry(element: Element, s: float) -> Geometry:
     except ValueError as err:
         raise refusal(element, f"<{shown_id(str(shape.tag))}> is no known shape") from err
     length = positive(element, "length", limit=MAX_ROAD_LENGTH)
-    params = _parse_params(shape, kind, length)
+    params = _parse_params(shape, kind, length, notes)
     turning = length * max(map(abs, params), default=0.0)
     if kind in {GeometryKind.ARC, GeometryKind.SPIRAL} and turning > MAX_TURNING:
         raise refusal(shape, f"turns by about {turning:g} rad; the limit is {MAX_TURNING:g}")
@@ -350,19 +351,49 @@ _PARAMETERS: Final[dict[GeometryKind, tuple[str, ...]]] = {
 }
 
 
-def _parse_params(shape: Element, kind: GeometryKind, length: float) -> tuple[float, ...]:
+def _parse_params(
+    shape: Element, kind: GeometryKind, length: float, notes: Notes
+) -> tuple[float, ...]:
     values = tuple(number(shape, name) for name in _PARAMETERS[kind])
     if kind is not GeometryKind.PARAM_POLY3:
         return values
     if not (any(values[1:4]) or any(values[5:8])):
         raise refusal(shape, "all coefficients but aU and aV are 0: the curve is a point")
-    normalized = choice(
-        shape, "pRange", {"arcLength": False, "normalized": True, None: True, "": True}
-    )
-    if not normalized:
+    if not _is_normalized(shape, values, length, notes):
         return values
     # p = ds / length, so that the k-th coefficient is divided by length^k.
     return tuple(value / length ** (i % 4) for i, value in enumerate(values))
+
+
+_P_RANGES: Final[dict[str | None, bool]] = {
+    "arcLength": False,
+    "normalized": True,
+    None: True,
+    "": True,
+}
+
+
+def _is_normalized(shape: Element, values: Sequence[float], length: float, notes: Notes) -> bool:
+    """Whether p of a paramPoly3 runs to 1, not to its length.
+
+    Where ``pRange`` says neither, the one by which the curve is as long as it is said to be holds.
+    """
+    known = {str(name).lower() for name in _P_RANGES}
+    said = shape.get("pRange")
+    if said is None or said.strip().lower() in known:
+        return spelt_choice(shape, "pRange", _P_RANGES, notes)
+    fits = []
+    for name, most in (("arcLength", length), ("normalized", 1.0)):
+        p = np.linspace(0.0, most, 65)
+        u, v = (np.polynomial.polynomial.polyval(p, values[i : i + 4]) for i in (0, 4))
+        curve = float(np.hypot(np.diff(u), np.diff(v)).sum())
+        if abs(curve - length) <= CURVE_TOLERANCE * length:
+            fits.append(name)
+    if len(fits) != 1:
+        return choice(shape, "pRange", _P_RANGES)
+    detail = f"pRange={shown(said)} is read as {fits[0]}, by which the curve is as long as it says"
+    notes.add(Rule.UNKNOWN_VALUE, shape, detail)
+    return fits[0] == "normalized"
 
 
 def _parse_profile(

@@ -372,6 +372,9 @@ _VEHICLES = frozenset(
     {"passengerCar", "bus", "delivery", "emergency", "taxi", "truck", "trucks", "motorcycle", "HOV"}
 )
 """Who drives, by the standard's names of road users."""
+_USERS = tuple(sorted(_VEHICLES - {"truck", "trucks", "HOV"} | {"bicycle"}))
+"""Road users whom a lane that is closed to all of them must deny; a name of trucks comes to it."""
+_RAIL_TYPES = frozenset({"tram", "rail"})
 
 
 def access_at(lane: Lane, s: float) -> tuple[LaneAccess, ...]:
@@ -384,19 +387,27 @@ def lane_use(lane: Lane) -> str:
     """What a lane is used as: its type, or what its access makes of a lane for driving.
 
     Only access that holds along the whole lane makes it another one. On a ``restricted`` lane no
-    cars drive, but those do whom its access allows.
+    cars drive, but those do whom its access allows, as on a ``tram`` or ``rail`` lane beside the
+    rail vehicles. A lane that denies every road user by name is ``restricted``.
     """
-    if not lane.access or lane.type not in {"driving", "shared", "restricted"}:
+    if not lane.access or lane.type not in {"driving", "shared", "restricted", *_RAIL_TYPES}:
         return lane.type
     first = lane.access[0].s
-    if any(record.s != first or record.rule != "allow" for record in lane.access):
+    if any(record.s != first for record in lane.access):
         return lane.type
     if lane.widths and first > lane.widths[0].s + 1e-3:
         return lane.type
+    denied = {record.restriction for record in lane.access if record.rule == "deny"}
+    if lane.type not in _RAIL_TYPES and denied.issuperset(_USERS) and denied & {"truck", "trucks"}:
+        return "restricted"
+    if any(record.rule != "allow" for record in lane.access):
+        return lane.type
     admitted = {record.restriction for record in lane.access}
+    if lane.type in _RAIL_TYPES and not admitted & _VEHICLES:
+        return lane.type
     for use, names in _USES_BY_ACCESS:
         if _NAMESAKES.get(use, use) in admitted and admitted <= names:
             return use
-    if lane.type == "restricted" and admitted & _VEHICLES:
+    if lane.type in {"restricted", *_RAIL_TYPES} and admitted & _VEHICLES:
         return "driving"
     return lane.type

@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from odscen.base.categories import Category
 from odscen.base.ids import LaneKey, RoadId
 from odscen.convert.building.network import build_network
 from odscen.convert.lane_table.sumo_network import SumoNetwork
@@ -16,6 +17,10 @@ from odscen.lanegraph.graphs import MapGraph
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.parse import parse
 from odscen.opendrive.road_model import OpenDrive
+from odscen.scenario.document.sampling_config import SamplingConfig, overridden
+from odscen.scenario.sampling.sampler import sample_scenario
+from odscen.sumo.realize.sumo_map import SumoMap
+from odscen.sumo.realize.usable import usable_places
 from tests.convert.maps import converted, each_map
 from tests.opendrive.snippets import document, lane, road, section
 
@@ -35,7 +40,7 @@ def one_lane(inside: str, kind: str = "driving") -> OpenDrive:
 
 def built(odr: OpenDrive) -> tuple[SumoNetwork, MapGraph]:
     table = RoadTable.of(odr)
-    graph = build_map_graph(odr, name="m", sha256="0", table=table)
+    graph = build_map_graph(odr, name="m", sha256="0" * 64, table=table)
     return build_network(odr, table, graph.walks), graph
 
 
@@ -234,3 +239,67 @@ def test_permissions_of_every_lane_are_those_of_its_type_and_access(path: Path) 
                 assert (classes[who] in own.allowed) == (rule == "allow"), key
         seen += 1
     assert seen
+
+
+def test_sampling_places_nobody_on_a_lane_that_does_not_admit_them() -> None:
+    plan = '<geometry s="0" x="0" y="0" hdg="0" length="600"><line/></geometry>'
+    lanes = section(lane(-1), lane(-2), lane(-3, inside=access("deny", "truck", "bicycle")))
+    network, graph = built(parse(document(road(length=600.0, plan=plan, lanes=lanes))))
+    usable = usable_places(SumoMap.of(graph, network.table))
+    config = overridden(SamplingConfig(), fill=1.0)
+    scenario = sample_scenario(graph, config, seed=1, name="s", usable=usable)
+    on_last = {one.category for one in scenario.actors if ".-3." in str(one.spawn)}
+    others = {one.category for one in scenario.actors if ".-3." not in str(one.spawn)}
+    assert {Category.TRUCK, Category.BICYCLE} <= others
+    assert Category.CAR in on_last
+    assert not on_last & {Category.TRUCK, Category.BICYCLE}
+    free = built(parse(document(road(length=600.0, plan=plan))))
+    assert usable_places(SumoMap.of(free[1], free[0].table)).barred == {}
+
+
+EVERYBODY = ("passengerCar", "bus", "delivery", "emergency", "taxi", "bicycle", "motorcycle")
+
+
+def test_a_lane_that_denies_every_road_user_by_name_is_a_restricted_one() -> None:
+    open_lane = lane(-1)
+    shut = lane(-2, inside=access("deny", *EVERYBODY, "truck", new=True))
+    network, graph = built(parse(document(road(lanes=section(open_lane, shut)))))
+    assert graph.lanes.lanes.types == ("driving",)
+    assert [one.allowed for one in network.table.lanes.values() if "bus" in one.allowed] == [
+        allowed("driving")
+    ]
+    reasons = [entry.reason for entry in network.report.entries]
+    assert "lanes of type restricted, on which no access allows vehicles: left out" in reasons
+    assert "access: deny bus; no vehicle uses the lane" in reasons
+
+
+def test_a_lane_that_denies_every_road_user_from_a_place_on_ends_there() -> None:
+    odr = one_lane(access("deny", *EVERYBODY, "truck", s=60.0))
+    network, _ = built(odr)
+    assert [
+        round(one.length) for one in network.table.lanes.values() if "_" in one.id and "f" in one.id
+    ] == [60]
+
+
+def test_a_track_whose_access_allows_buses_is_a_bus_lane_with_trams() -> None:
+    network, graph = built(one_lane(access("allow", "bus", "taxi"), kind="tram"))
+    assert graph.lanes.lanes.types == ("bus",)
+    assert [one.allowed for one in network.table.lanes.values() if "bus" in one.allowed] == [
+        allowed("bus") | {"taxi", "tram"}
+    ]
+
+
+def test_a_track_stays_one_for_cyclists_and_from_a_place_on() -> None:
+    for inside in (access("allow", "bicycle"), access("allow", "bus", s=40.0)):
+        network, graph = built(one_lane(inside, kind="tram"))
+        assert graph.lanes.lanes.types == ()
+        assert {"tram"} in [one.allowed for one in network.table.lanes.values()]
+        reasons = [e.reason for e in network.report.entries if e.outcome == "lost"]
+        assert any(one.endswith("on a lane for rail vehicles alone; left out") for one in reasons)
+
+
+def test_access_behind_the_end_of_its_lane_is_told_as_lost() -> None:
+    network, _ = built(one_lane(access("allow", "bus", s=500.0)))
+    reason = "access: allow bus from s=500, behind the end of the lane; left out"
+    assert ("lost", reason) in [(e.outcome, e.reason) for e in network.report.entries]
+    assert permissions(one_lane(access("allow", "bus", s=500.0))) == [allowed("driving")]

@@ -10,7 +10,13 @@ import numpy as np
 from odscen.base.ids import LaneKey
 from odscen.base.shown import shown_id
 from odscen.convert.lane_table.coverage import covered_metres, kept_lanes, lane_lengths
-from odscen.convert.model.access import allowed, has_class, is_used, vehicle_classes
+from odscen.convert.model.access import (
+    TRACK_TYPES,
+    allowed,
+    has_class,
+    is_used,
+    vehicle_classes,
+)
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.convert.model.edge_plan import LEAST_WIDTH, NO_WIDTH
 from odscen.convert.model.net import CROSSING
@@ -221,7 +227,13 @@ def _find_access_entries(odr: OpenDrive) -> Iterator[ReportEntry]:
         for number, section in enumerate(road.sections):
             for lane in section.lanes.values():
                 for record in lane.access:
-                    yield _access_entry(_describe_place(road.id, number, lane.id), lane, record)
+                    element = _describe_place(road.id, number, lane.id)
+                    if record.s > section.s_end:
+                        who = f"access: {record.rule} {record.restriction}".replace("  ", " ")
+                        reason = f"{who} from s={record.s:g}, behind the end of the lane; left out"
+                        yield ReportEntry(ElementOutcome.LOST, element, reason)
+                    else:
+                        yield _access_entry(element, lane, record)
 
 
 def _access_entry(element: str, lane: Lane, record: LaneAccess) -> ReportEntry:
@@ -237,7 +249,12 @@ def _access_entry(element: str, lane: Lane, record: LaneAccess) -> ReportEntry:
         outcome = ElementOutcome.LOST
         if lane_use(lane) in WALKABLE_TYPES and (rule, name) == ("allow", "pedestrian"):
             outcome, reason = ElementOutcome.KEPT, "access: open to pedestrians"
+        elif rule == "deny":
+            outcome, reason = ElementOutcome.KEPT, f"access: deny {name}; no vehicle uses the lane"
         return ReportEntry(outcome, element, reason)
+    if lane_use(lane) in TRACK_TYPES:
+        reason = f"access: {rule} {name} on a lane for rail vehicles alone; left out"
+        return ReportEntry(ElementOutcome.LOST, element, reason)
     classes = ", ".join(sorted(vehicle_classes(lane, record.s))) or "no vehicle"
     return ReportEntry(ElementOutcome.KEPT, element, f"access from s={record.s:g}: {classes}")
 

@@ -90,6 +90,8 @@ _BY_RESTRICTION = {
 ``simulator``, ``autonomousTraffic`` and ``throughTraffic`` tell vehicles of one class apart by who
 drives them and where to, which no lane of SUMO does.
 """
+_UNNAMED = frozenset({"army", "custom1", "custom2"})
+"""Classes that no name of the standard stands for."""
 _RIGHT_OF_WAY = frozenset({"emergency", "authority"})
 """Who may use every lane for vehicles that is reserved for some."""
 
@@ -104,8 +106,9 @@ def vehicle_classes(lane: Lane, s: float) -> frozenset[str]:
     """Vehicle classes on a lane at s of its road, by its type and by ``<access>``.
 
     Of the records that hold there those that allow name all who may use the lane, and those that
-    deny take classes from them. ``none`` restricts nobody. On a lane whose type is reserved, those
-    whom access allows are added.
+    deny take classes from them: all, where every class that has a name is denied. ``none``
+    restricts nobody. On a lane whose type is reserved, or for rail vehicles, those whom access
+    allows are added.
     """
     kind = lane_use(lane)
     base = allowed(kind)
@@ -125,13 +128,19 @@ def vehicle_classes(lane: Lane, s: float) -> frozenset[str]:
     classes = base
     if granted:
         named = frozenset[str]().union(*granted) - PEDESTRIAN
-        if kind in _RESERVED or kind in BICYCLE_TYPES:
+        if kind in TRACK_TYPES:
+            classes = base
+        elif kind in _RESERVED or kind in BICYCLE_TYPES:
             classes = base | named
         elif named and named != BICYCLE:
             classes = named | _RIGHT_OF_WAY
         else:
             classes = named
-    return classes - frozenset[str]().union(*denied)
+    left = classes - frozenset[str]().union(*denied)
+    # A lane that is closed to each road user by name is closed.
+    if left <= _UNNAMED:
+        return frozenset()
+    return left | TRACK_TYPES[lane.type] if lane.type in TRACK_TYPES else left
 
 
 def is_used(lane_type: str) -> bool:

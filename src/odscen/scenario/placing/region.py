@@ -51,6 +51,9 @@ class Usable:
         before them for example. ``None``: those of the map's junctions.
     bodies
         Size of each category.
+    barred
+        For categories that may not use all that is spawnable, the nodes that they may not, shape
+        ``(N,)``: a truck on a lane that denies trucks.
     """
 
     spawnable: BoolArray | None = None
@@ -58,6 +61,7 @@ class Usable:
     walkable: BoolArray | None = None
     in_junction: BoolArray | None = None
     bodies: Mapping[Category, Body] = field(default_factory=lambda: DEFAULT_BODY)
+    barred: Mapping[Category, BoolArray] = field(default_factory=dict)
 
 
 class NodePlace(NamedTuple):

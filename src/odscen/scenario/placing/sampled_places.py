@@ -67,8 +67,10 @@ def vehicle_supply(
         if share > 0:
             limit = places.speed_limit_max.get(category, np.inf)
             body = usable.bodies[category]
-            room = standing_room(lanes, body, allowed=spawnable)
-            allowed[category] = centre & room & ~(lanes.speed_limit > limit)
+            barred = usable.barred.get(category)
+            open_to = spawnable if barred is None else spawnable & ~barred
+            room = standing_room(lanes, body, allowed=open_to)
+            allowed[category] = centre & open_to & room & ~(lanes.speed_limit > limit)
     wanted = {category: shares[category] for category in allowed}
     gap = places.minimum_gap
     fit = max_fit(lanes, usable.bodies, allowed, shares=wanted, minimum_gap=gap)

@@ -9,6 +9,7 @@ import numpy as np
 
 from odscen.lanegraph.graphs import Relation
 from odscen.scenario.placing.region import Usable
+from odscen.sumo.realize.driving import KINDS
 from odscen.sumo.realize.road_net import PEDESTRIAN
 
 if TYPE_CHECKING:
@@ -37,7 +38,8 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     - *drivable*: the lane exists in SUMO, somewhere along it at least;
     - *walkable*: the place is on the lane of its edge that pedestrians use, outside junctions,
       within :data:`DEVIATION`;
-    - *in_junction*: the SUMO lane is one inside a junction.
+    - *in_junction*: the SUMO lane is one inside a junction;
+    - *barred*: the SUMO lane does not admit the category.
     """
     graph = sumo_map.graph
     lanes, walks = graph.lanes, graph.walks
@@ -55,11 +57,18 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     inside = _of_lanes(lane.internal for lane in _lanes_of_places(sumo_map, sumo_map.lane_places))
     on_foot = _mask_of_admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
     on_foot &= walked[sumo_map.walk_places.lane] & _mask_of_near(sumo_map.walk_places)
+    spawnable = _all_around(exact, lanes, reach)
+    barred = {
+        category: ~_mask_of_admitted(sumo_map, sumo_map.lane_places, traits.vclass)
+        for category, traits in KINDS.items()
+        if traits.vclass != PEDESTRIAN
+    }
     return Usable(
-        spawnable=_all_around(exact, lanes, reach),
+        spawnable=spawnable,
         drivable=sumo_map.drivable,
         walkable=on_foot & ~walks.roadside[walks.lane],
         in_junction=(sumo_map.lane_places.lane >= 0) & inside[sumo_map.lane_places.lane],
+        barred={name: nodes for name, nodes in barred.items() if (nodes & spawnable).any()},
     )
 
 
