@@ -619,3 +619,22 @@ def test_who_follows_a_trajectory_at_a_negative_speed_reverses_along_it_far_besi
     assert ego["y"].to_numpy() == pytest.approx(30.0, abs=0.01)
     assert np.cos(ego["hdg"].to_numpy()).min() > 0.999
     assert "backwards along its trajectory, at a positive speed" in reasons(found, "approximated")
+
+
+def test_a_walker_that_has_only_a_speed_walks_on_along_its_lane(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    start = """<Private entityRef="VRU"><PrivateAction><TeleportAction><Position>
+<LanePosition roadId="0" laneId="-2" s="100" offset="0.5"/></Position></TeleportAction>
+</PrivateAction><PrivateAction><LongitudinalAction><SpeedAction><SpeedActionDynamics
+dynamicsShape="step" dynamicsDimension="time" value="0"/><SpeedActionTarget><AbsoluteTargetSpeed
+value="2"/></SpeedActionTarget></SpeedAction></LongitudinalAction></PrivateAction></Private>"""
+    text = scene(Entities=WALKER, Actions=start)
+    walk = '<lane id="-3" type="sidewalk"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane>'
+    (tmp_path / "road.xodr").write_text(ROAD.replace("</right>", f"{walk}</right>"))
+    (tmp_path / "scene.xosc").write_text(text)
+    found = import_file(workspace, tmp_path / "scene.xosc")
+    [first] = [one for one in found.scenario.rules if one.actor == "VRU"]
+    path = next(part.path for item in first.then for part in item.parts if part.path is not None)
+    assert path.points == ((600.0, -4.75),)
+    assert "it walks on along its lane" in reasons(found, "approximated")

@@ -155,3 +155,31 @@ def test_one_that_comes_against_a_lane_from_a_place_of_parameters_stays_in_it(
     assert np.cos(other["hdg"].to_numpy()) == pytest.approx(-1.0, abs=1e-6)
     passed = np.diff(other["time"].to_numpy())
     assert np.diff(other["x"].to_numpy()) / passed == pytest.approx(-20.0, abs=0.05)
+
+
+def test_whose_trajectory_ends_in_the_opposite_lane_goes_on_there_and_does_not_turn_round(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    rows = "".join(
+        f'<Vertex time="0"><Position><WorldPosition x="{x}" y="{y}" h="0"/></Position></Vertex>'
+        for x, y in ((80, -1.75), (110, 1.75), (140, 1.75))
+    )
+    follow = (
+        "<RoutingAction><FollowTrajectoryAction><TrajectoryRef><Trajectory name='t' closed='false'>"
+        f"<Shape><Polyline>{rows}</Polyline></Shape></Trajectory></TrajectoryRef><TimeReference>"
+        "<None/></TimeReference><TrajectoryFollowingMode followingMode='position'/>"
+        "</FollowTrajectoryAction></RoutingAction>"
+    )
+    own = '<LanePosition roadId="0" laneId="-1" s="60"/>'
+    text = overtaking("", AHEAD).replace(STARTS, own).replace('s="48.6"', 's="480"')
+    text = re.sub(r"(?s)<LateralAction>.*?</LateralAction>", follow, text, count=1)
+    text = HEADWAY.sub("", text).replace(AHEAD, '<TraveledDistanceCondition value="1"/>')
+    text = text.replace(SPEED, SPEED.replace('value="5"', 'value="20"'))
+    (tmp_path / "road.xodr").write_text(TWO_WAY)
+    (tmp_path / "scene.xosc").write_text(text)
+    _, rows_of = play(workspace, tmp_path / "scene.xosc", tmp_path)
+    other = rows_of["Other"]
+    late = other.filter(other["time"].is_between(5.0, 12.0))
+    assert late["y"].to_numpy() == pytest.approx(1.75, abs=0.05)
+    assert np.diff(late["x"].to_numpy()) == pytest.approx(20.0 * np.diff(late["time"]), abs=0.05)
+    assert np.cos(late["hdg"].to_numpy()).min() > 0.99

@@ -769,6 +769,8 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "it switches lights, and map {name} has none with two stages or more" }),
   msg({ message: "it takes about {needed}" }),
   msg({ message: "it took more than {time_limit} s" }),
+  msg({ message: "it walks on along its lane" }),
+  msg({ message: "it walks straight on" }),
   msg({ message: "it was stopped" }),
   msg({ message: "it would have to go at {needed} m/s to be there in time" }),
   msg({ message: "it would have to reach {v1} m/s for a gap of {gap} m in time" }),

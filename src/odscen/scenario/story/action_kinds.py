@@ -171,12 +171,28 @@ def on_the_path(part: PathFollowing, acting_actor: ActingActor, end: float) -> f
 
 
 def end_of_path(part: PathFollowing, acting_actor: ActingActor) -> None:
-    """Give a vehicle back to SUMO; a person stays unless it is on a sidewalk."""
+    """Give a vehicle back to SUMO; a person stays unless it is on a sidewalk.
+
+    Whom the story drives and who is in an opposite lane by then goes straight on.
+    """
     if acting_actor.actor.person:
         _leave_or_stay(part.points[-1], acting_actor)
     else:
         acting_actor.channel.release_speed(acting_actor.instant)
-        acting_actor.channel.leaves = True
+        acting_actor.channel.leaves = not _is_against_lane(acting_actor)
+
+
+def _is_against_lane(acting_actor: ActingActor) -> bool:
+    """Whether whom the story drives is in an opposite lane, in which SUMO would turn it round."""
+    if not acting_actor.channel.by_story:
+        return False
+    lane, front = (
+        acting_actor.view.lane_line(acting_actor.actor.id, 0),
+        _front_of_actor(acting_actor),
+    )
+    if lane is None or abs(beside(lane, front).left) >= _ON_LANE:
+        return False
+    return not _leads_on(lane, front, acting_actor.actor.hdg)
 
 
 def replay(part: Replaying, acting_actor: ActingActor) -> float:

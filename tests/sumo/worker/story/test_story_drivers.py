@@ -190,3 +190,14 @@ def test_who_is_in_a_lane_off_its_route_goes_on_along_it_at_its_speed(
         ego.x[0] - 8.0 * ego.time[ego.time > 14.0], abs=1.0
     )
     assert ego.y[ego.time > 14.0] == pytest.approx([3.25] * int((ego.time > 14.0).sum()), abs=0.1)
+
+
+def test_one_that_reverses_hits_at_the_sum_of_the_speeds(tmp_path: Path) -> None:
+    actors = [car("ego", 370.0, 5.0, ego=True), car("other", 400.0, 2.0)]
+    back = {"points": [[380.0, MIDDLE], [340.0, MIDDLE]], "behind": 4.0, "backwards": True,
+            "speed": 2.0}  # fmt: skip
+    rules = [after(0.0, {"path": back}, actor="other")]
+    found = run(document(MOTORWAY, actors, rules, step=0.1), tmp_path / "run")
+    [hit] = [one for one in found.events if one.kind == "collision"]
+    assert (hit.values or {})["impact_speed"] == pytest.approx(7.0, abs=0.05)
+    assert hit.time == pytest.approx(gap_at_start(found) / 7.0, abs=0.1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
@@ -123,6 +124,8 @@ class AppearanceReader:
 
 
 # ----------------------------------------------------------------------------- where actors start
+_WALKS, _WALK_STEP = 500, 5
+"""Metres for which a walker that has only a speed walks on, and of its line at most in a step."""
 _BESIDE: Final = 10.0
 """Metres that an actor can be beside its lane."""
 _FAR: Final = 100_000.0
@@ -200,6 +203,25 @@ class ActorPlaces:
         walks = self._positions.graph.walks
         node = int(((walks.x - centre.x) ** 2 + (walks.y - centre.y) ** 2).argmin())
         return {"spawn": str(walk_node_id(self._positions.graph, node))}
+
+    def walk_on(self, entity: ReadEntity, centre: MapPoint) -> Made:
+        """Path of a walker that has only a speed: along the lane that it is on, or straight on."""
+        positions, at = self._positions, MapPoint(float(centre.x), float(centre.y), centre.hdg)
+        node = positions.node_near(at)
+        left = float(positions.left_of(node, at))
+        lanes = positions.graph.lanes
+        along = math.cos(at.hdg - float(lanes.hdg[node])) > math.cos(math.pi / 4.0)
+        if not along or abs(left) > float(lanes.width[node]) / 2.0:
+            self._report.mark(entity.element, "approximated", "it walks straight on")
+            points = [at.moved(_WALKS)]
+        else:
+            self._report.mark(entity.element, "approximated", "it walks on along its lane")
+            begin = float(positions.ahead_of(node, at))
+            steps = range(_WALK_STEP, _WALKS + 1, _WALK_STEP)
+            points = [positions.point_along(node, begin + metres, left) for metres in steps]
+            bends = [a.hdg != b.hdg for a, b in itertools.pairwise(points)]
+            points = [*itertools.compress(points, bends), points[-1]]
+        return {"path": {"points": [[round(one.x, 4), round(one.y, 4)] for one in points]}}
 
     def aside(self, entity: ReadEntity, centre: MapPoint, *, led: bool) -> float:
         """Metres to the left of the nearest lane that leads its way, 0 on a lane.
@@ -493,6 +515,8 @@ class InitReader:
             if then and not changes and not stands:  # as entities do until they get a speed
                 then = [{"speed": {"to": 0.0, "shape": "step"}}, *then]
             then = then or [{"stop": {}}]
+            if speed > 0 and not any({"path", "arrive"} & action.keys() for action in then):
+                then = [*then, self._places.walk_on(entity, centre)]
             if not late:
                 then = [{"appear": {"at": [centre.x, centre.y, centre.hdg]}}, *then]
         else:

@@ -79,6 +79,15 @@ class _Swept(NamedTuple):
             x, y = now.x + part * (before.x - now.x), now.y + part * (before.y - now.y)
         return replace(now, x=x, y=y, hdg=hdg, speed=last - (last - first) * share)
 
+    def velocity(self, view: ActorView) -> tuple[float, float]:
+        """X and y of its velocity in a view of it, m/s; against its heading if it reverses."""
+        x, y = view.velocity
+        if self.before is not None:
+            moved = (self.now.x - self.before.x) * x + (self.now.y - self.before.y) * y
+            if moved < 0.0:
+                return -x, -y
+        return x, y
+
 
 class BodyContacts:
     """Finds when bodies of moved road users begin to overlap others."""
@@ -253,10 +262,10 @@ def _overlap_before(one: _Swept, other: _Swept, back: float) -> bool:
 
 def _contact_event(one: _Swept, other: _Swept, time: float, back: float) -> Event:
     """Event of a contact that began so many seconds before ``time``."""
-    first, second = one.view(back), other.view(back)
-    hitting = max((first, second), key=lambda body: (body.speed, body.id))
-    hit = second if hitting is first else first
-    (ax, ay), (bx, by) = hitting.velocity, hit.velocity
+    faster = max((one, other), key=lambda body: (body.view(back).speed, body.now.id))
+    slower = other if faster is one else one
+    hitting, hit = faster.view(back), slower.view(back)
+    (ax, ay), (bx, by) = faster.velocity(hitting), slower.velocity(hit)
     x, y = _touching_point(hitting, hit)
     return Event(
         time - back,
