@@ -21,6 +21,7 @@ from odscen.scenario import edits
 from odscen.scenario.demand.targets import Target, hold_back, read_targets
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import MapReference, Scenario
+from odscen.scenario.edits.program_changes import stages_in_plan, timing_of_light
 from tests.app.conftest import CROSSING
 
 UNTIL = 1200.0
@@ -170,6 +171,27 @@ def test_a_headway_is_found_again_and_holds_at_approaches_held_back(workspace: W
     assert done.steps[0].what == "headway 1.4 s"
     assert done.steps[0].kept
     assert done.scenario.drivers.headway == pytest.approx(1.7, abs=0.2)
+    assert_fits_and_held_ones_improve(done)
+
+
+@pytest.mark.slow
+def test_a_green_is_found_again_and_holds_at_approaches_held_back(workspace: Workspace) -> None:
+    start = straight_on(workspace)
+    _, junction = ends_of(workspace)
+    lights = load_map(workspace.map(CROSSING)).lights
+    name = junction.removeprefix("j")
+    truth = edits.set_green(start, lights, name, stage="1", green=17.0, keep_cycle=True)
+    targets = measure(workspace, truth, approach_targets(workspace, held={"r2", "r4"}))
+    done = calibrate(workspace, start, targets, change=["programs"], seeds=[9], trials=8)
+    assert done.steps[0].what == f"green of {name}, stage 1 18 s"
+    assert done.steps[0].kept
+    # The next stage has 5 s at least, so 22 s are not tried.
+    assert f"green of {name}, stage 1 22 s" not in {step.what for step in done.steps}
+    _, timing = timing_of_light(done.scenario, lights, name)
+    (light,) = lights
+    first, second = stages_in_plan(timing, light, None)
+    assert first.green == pytest.approx(17.0, abs=1.0)
+    assert first.green + second.green == 26.0
     assert_fits_and_held_ones_improve(done)
 
 

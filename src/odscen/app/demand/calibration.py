@@ -437,7 +437,10 @@ def _try_knobs(work: _Work, best: _Best, knobs: Sequence[Knob]) -> None:
         scenario = base
         for other in knobs:
             if new[other.name] != other.start:
-                scenario = other.apply(scenario, new[other.name])
+                changed = other.apply(scenario, new[other.name])
+                if changed == scenario:
+                    return False  # a light cannot give so much: a run would be that of another
+                scenario = changed
         what = f"{knob.name} {new[knob.name]:g} {knob.unit}".rstrip()
         if not work.try_scenario(best, scenario, what):
             return False
