@@ -34,6 +34,8 @@ BUILD = ROOT / "build" / "interchange"
 SHIPPED = ("signal_crossing", "town_5x5", "rural_hills")
 FARTHEST = 0.05
 """Metres that a position may be off."""
+EXACT_METRES, EXACT_RADIANS = 0.001, math.radians(0.01)
+"""The same where positions are written as they are, and headings."""
 STEP = 0.1
 
 
@@ -42,12 +44,15 @@ class Reader:
     """What is installed for a format, as lists of arguments of pip, and the end of its files.
 
     ``{site}`` is the folder of the environment's packages; ``of`` names the reader that shares its
-    environment.
+    environment. ``format`` is what is exported, unless it is called as the reader, ``options`` how.
     """
 
     ending: str
     packages: tuple[tuple[str, ...], ...]
     of: str | None = None
+    format: str | None = None
+    options: tuple[tuple[str, str], ...] = ()
+    exact: bool = False
 
 
 READERS = {
@@ -76,8 +81,18 @@ READERS = {
     ),
     "arrays": Reader(".npz", (), of="pyg"),
     "scenarionet": Reader("", (("metadrive-simulator==0.4.3",),)),
-    "osi": Reader(".osi", (("omega-prime==0.3.7", "betterosi==0.9.0"),)),
+    "osi": Reader(".osi", (("omega-prime==0.3.7", "betterosi==0.9.0"),), exact=True),
+    "osi-utilities": Reader(
+        ".osi", (("asam-osi-utilities==0.4.0", "osi-python==3.8.0"),), format="osi", exact=True
+    ),
+    "osi-mcap": Reader(
+        ".mcap", (), of="osi-utilities", format="osi", options=(("container", "mcap"),), exact=True
+    ),
 }  # fmt: skip
+
+
+SCRIPTS = {"osi-utilities": "osi_utilities", "osi-mcap": "osi_utilities"}
+"""Readers whose script is not called as they are."""
 
 
 def environment(name: str) -> Path:
@@ -98,8 +113,10 @@ def environment(name: str) -> Path:
     return python
 
 
-def recorded_runs(maps: list[Path], *, seconds: float, fill: float) -> list[tuple[Workspace, Run]]:
-    """A run of each map with a step of 0.1 s."""
+def recorded_runs(
+    maps: list[Path], *, seconds: float, fill: float, each: int = 1
+) -> list[tuple[Workspace, Run]]:
+    """So many runs of each map with a step of 0.1 s."""
     workspace = Workspace.open(BUILD / "workspace")
     settings = RunSettings(until=seconds, step_length=STEP)
     runs = []
@@ -107,7 +124,7 @@ def recorded_runs(maps: list[Path], *, seconds: float, fill: float) -> list[tupl
         name = f"{file.parent.name}-{file.stem}" if file.parent.name != "maps" else file.stem
         if name not in {entry.name for entry in workspace.maps()}:
             workspace.add_map(file, name=name)
-        sampled = GenerationSettings(map_name=name, seed=7, fill=fill, roi_segments=40)
+        sampled = GenerationSettings(map_name=name, seed=7, fill=fill, roi_segments=40, count=each)
         paths = generate(workspace, settings=sampled)
         made = run_many(workspace, paths, settings=settings, reports=False)
         runs += [(workspace, run) for run in made]
@@ -130,7 +147,7 @@ def come_back(workspace: Workspace, run: Run) -> dict[str, Any]:
 
 def _told(name: str, file: Path, out: Path) -> dict[str, Any]:
     """Let a reader read a file in its environment; what it says at the end."""
-    script = ROOT / "tools" / "readers" / f"{name}_reader.py"
+    script = ROOT / "tools" / "readers" / f"{SCRIPTS.get(name, name)}_reader.py"
     done = subprocess.run(
         [environment(name), script, file, out],
         check=False,
@@ -147,8 +164,10 @@ def _told(name: str, file: Path, out: Path) -> dict[str, Any]:
 def read(name: str, workspace: Workspace, run: Run) -> dict[str, Any]:
     """Export a run, read it, and compare; counts and the largest error."""
     out = BUILD / "exports" / name / run.folder.name
-    files = export_run(workspace, run.folder, out, to=name)
-    ending = READERS[name].ending
+    reader = READERS[name]
+    to, options = reader.format or name, dict(reader.options)
+    files = export_run(workspace, run.folder, out, to=to, options=options)
+    ending = reader.ending
     file = next(one for one in files if one.name.endswith(ending)) if ending else out
     rows_file = out / "read.json"
     counts = _told(name, file, rows_file)
@@ -197,7 +216,7 @@ def _named(name: str, rows: list[list[Any]], notes: dict[str, Any], begin: float
         }
         for scenario, number, step, *pose in rows:
             yield (names[number], first[scenario] + step), pose
-    elif name == "osi":
+    elif (READERS[name].format or name) == "osi":
         names = {number: one for one, number in notes["ids"].items()}
         for number, time, *pose in rows:
             yield (names[number], round((time - begin) / STEP)), pose
@@ -230,7 +249,10 @@ def check(result: dict[str, Any]) -> list[str]:
         walks = result.get("crosswalks", 0)
         if count - walks != result["expected_lanes"]:
             wrong.append(f"{count - walks} of {result['expected_lanes']} lanes")
-    if result["max_error_m"] > FARTHEST:
+    exact = READERS[result["format"]].exact
+    if exact and result["max_error_rad"] > EXACT_RADIANS:
+        wrong.append(f"{result['max_error_rad']} rad off")
+    if result["max_error_m"] > (EXACT_METRES if exact else FARTHEST):
         wrong.append(f"{result['max_error_m']} m off")
     return wrong
 
@@ -242,9 +264,10 @@ def main() -> int:
     parser.add_argument("--maps", type=Path, nargs="+", help="OpenDRIVE files")
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--fill", type=float, default=0.1)
+    parser.add_argument("--each", type=int, default=1, help="runs of each map")
     given = parser.parse_args()
     maps = given.maps or [ROOT / "maps" / f"{name}.xodr" for name in SHIPPED]
-    runs = recorded_runs(maps, seconds=given.seconds, fill=given.fill)
+    runs = recorded_runs(maps, seconds=given.seconds, fill=given.fill, each=given.each)
     results, failed = [], False
     for name in given.formats or READERS:
         for workspace, run in runs:

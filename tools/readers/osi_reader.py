@@ -29,7 +29,7 @@ def main(file, out):
                 (one.id.value, time, base.position.x, base.position.y, base.orientation.yaw)
             )
     assert len(lights) == 1  # the same bulbs at each instant
-    recording = omega_prime.Recording.from_file(file)
+    recording = omega_prime.Recording.from_file(file, validate=True)
     assert recording.df.height == len(rows)
     assert set(recording.df["idx"].unique()) == numbers
     Path(out).write_text(json.dumps(rows))
