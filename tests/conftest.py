@@ -13,7 +13,7 @@ settings.load_profile("odscen")
 
 # Of the slow tests `make test` runs one in so many, the same at each commit; `make test SLOW=all`
 # runs all of them, see CONTRIBUTING.md.
-SLOW_PARTS = 32
+SLOW_PARTS = 64
 
 _DEFAULT_MAPS = Path(__file__).parents[2] / "shared" / "maps"
 

@@ -83,6 +83,7 @@ def _same(found: States, recorded: States, *, within: float) -> None:
 
 
 # ---------------------------------------------------------------------------- PyTorch Geometric
+@pytest.mark.slow
 def test_the_arrays_have_every_recorded_state(exports: Path, recorded: States) -> None:
     arrays = read_arrays(_file(exports, "pyg/*.npz"))
     steps = np.round(arrays["time"] * 10).astype(int)

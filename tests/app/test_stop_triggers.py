@@ -79,6 +79,7 @@ def test_a_stop_trigger_is_a_duration_or_a_rule_that_ends_the_run(
     )
 
 
+@pytest.mark.slow
 def test_a_run_ends_when_the_file_says_so(workspace: Workspace, tmp_path: Path) -> None:
     found = read(workspace, tmp_path, stopping(when(TIME.format(20)), when(DROVE)))
     done = run(workspace, found.scenario, name="run", out=tmp_path)

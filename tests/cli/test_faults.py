@@ -284,6 +284,7 @@ def test_an_export_onto_a_full_disk_says_so_in_our_words(workspace, short_run, t
     assert done.err == f"error: {tmp_path}: the disk is full; free some room\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [{}, {"LC_ALL": "C", "PYTHONUTF8": "0"}])
 def test_a_run_folder_whose_path_is_no_text_is_refused_before_anything_runs(
     workspace, scenario, tmp_path, place
@@ -301,6 +302,7 @@ def test_a_run_folder_whose_path_is_no_text_is_refused_before_anything_runs(
     assert not out.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("streams", "code"),
     [("2>&-", 2), (">&- 2>&-", 2), ("2>/dev/full", 2), (">/dev/full", 2)],

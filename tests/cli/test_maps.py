@@ -226,6 +226,7 @@ def test_a_map_that_follows_says_so_without_a_word(workspace):
     assert all(one["fidelity"] == {"passed": True, "not_held": []} for one in listed["maps"])
 
 
+@pytest.mark.slow
 def test_a_road_whose_nodes_would_be_those_of_walks_is_refused(tmp_path):
     file = tmp_path / "ped.xodr"
     file.write_text(document(road("ped.1")))
@@ -300,6 +301,7 @@ def test_a_map_beyond_its_memory_ends_with_code_3_and_what_to_do(tmp_path):
     assert odscen("maps", "list", "--json", "--workspace", tmp_path).json["maps"] == []
 
 
+@pytest.mark.slow
 def test_the_first_line_of_a_map_says_what_is_lost_for_traffic(tmp_path):
     sign = '<signal id="{}" s="90" t="-4" dynamic="no" country="DE" type="999" subtype="-1"/>'
     access = '<access sOffset="0" rule="deny" restriction="throughTraffic"/>'

@@ -152,6 +152,7 @@ def test_lengths_are_written_in_metres_or_kilometres():
     assert [length_text(v) for v in (0.5, 200.0, 2000.0)] == ["0.5 m", "200 m", "2 km"]
 
 
+@pytest.mark.slow
 def test_a_png_has_the_width_that_was_asked_for():
     pytest.importorskip("cairosvg")
     png = svg_to_png(render(), width=321)

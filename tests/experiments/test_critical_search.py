@@ -59,6 +59,7 @@ def found(behind: Scenario, tmp_path_factory: pytest.TempPathFactory) -> SearchR
     return search(workspace(), behind, AXES, out, search_settings=HOW, settings=SETTINGS)
 
 
+@pytest.mark.slow
 def test_what_is_critical_is_what_is_not_safe(found: SearchResult) -> None:
     assert found.table["status"].to_list() == ["completed"] * 3
     assert found.table["criticality"].null_count() == 0

@@ -59,6 +59,7 @@ def tree(folder: Path) -> Any:
     return etree.parse(written(folder, "1.2"))
 
 
+@pytest.mark.slow
 def test_everybody_goes_where_their_body_was_at_each_recorded_time(folder: Path, tree: Any) -> None:
     rows = Run.open(folder).trajectories()
     for name in ("ego", "late", "child"):

@@ -111,6 +111,7 @@ def test_paths_are_as_short_as_networkx_finds_them(source: int, target: int) -> 
     assert ROUTER.distances(source)[target] == pytest.approx(shortest, abs=1e-4)
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(
     st.sets(st.integers(1, 6), min_size=1).map(sorted),
@@ -156,6 +157,7 @@ def test_a_candidate_is_what_the_list_of_candidates_holds(kind: type, graph: Map
         assert {goal for goal in reached if router.is_candidate(spawn, goal)} == candidates
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [Router, WalkRouter])
 @pytest.mark.parametrize("graph", [FORK, ring(), two_lane_road(), line_of_segments(4)])
 def test_candidates_of_many_are_those_of_each(

@@ -225,6 +225,7 @@ def test_modules_beside_the_caller_do_not_hide_those_of_python(tmp_path: Path) -
     assert (done.returncode, "built in" in done.stderr) == (0, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "words"),
     [

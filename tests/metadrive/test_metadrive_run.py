@@ -56,6 +56,7 @@ def parity_of(run: Run) -> dict[str, object]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("stand_in")
 def test_a_run_is_replayed_with_records_figures_and_parity(
     workspace: Workspace, sampled: Path, tmp_path: Path

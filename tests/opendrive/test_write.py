@@ -79,6 +79,7 @@ def test_shipped_maps_are_the_same_after_writing(path: Path) -> None:
     assert write_opendrive(again) == text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["carla-2019/Town03", "carla-2020/Town07", "esmini/e6mini-lht", "esmini/fabriksgatan"]
 )

@@ -26,6 +26,7 @@ def run(client: TestClient, sampled: str) -> str:
     return name
 
 
+@pytest.mark.slow
 def test_sums_of_lanes_are_those_of_the_run_and_make_the_figures_of_its_tables(
     client: TestClient, workspace: Workspace, run: str
 ) -> None:
@@ -70,12 +71,14 @@ def test_nodes_of_the_graph_lie_on_the_lanes_that_vehicles_drove_on(
     assert covered == on_driven
 
 
+@pytest.mark.slow
 def test_the_answer_is_not_sent_twice(client: TestClient, run: str) -> None:
     first = client.get(f"/api/runs/{run}/lanes")
     again = client.get(f"/api/runs/{run}/lanes", headers={"If-None-Match": first.headers["etag"]})
     assert (again.status_code, again.content) == (304, b"")
 
 
+@pytest.mark.slow
 def test_a_run_without_lane_data_is_refused_in_words(
     client: TestClient, workspace: Workspace, run: str
 ) -> None:

@@ -383,6 +383,7 @@ def test_a_run_whose_preparation_fails_can_be_removed(
     assert client.get(f"/api/runs/{run}").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_scenario_with_errors_is_not_run(client: TestClient) -> None:
     client.post("/api/scenarios", json={"map": CROSSING, "name": "empty"})
     answer = client.post("/api/runs", json={"scenario": "empty"})

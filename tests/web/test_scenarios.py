@@ -227,6 +227,7 @@ def test_edits_over_the_wire_give_the_same_documents_as_in_python(
         assert [p["code"] for p in state["problems"]] == [p.code for p in checked]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "arguments"),
     [

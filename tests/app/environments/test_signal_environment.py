@@ -42,6 +42,7 @@ def play(env: Any, *, seed: int) -> list[float]:
     return rewards
 
 
+@pytest.mark.slow
 def test_an_episode_has_a_choice_every_five_seconds_and_is_the_same_by_seed() -> None:
     env = rl.SignalEnvironment(workspace(), rush())
     assert env.action_space.n == 2

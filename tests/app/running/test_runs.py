@@ -40,6 +40,7 @@ def test_a_scenario_with_errors_is_refused_and_none_of_the_others_is_run(
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_has_ended_is_replaced_only_where_that_is_said(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -111,6 +112,7 @@ def test_files_can_be_added_when_the_simulation_has_ended_and_before_the_report(
     assert (result.folder / "report.html").is_file()
 
 
+@pytest.mark.slow
 def test_a_checked_scenario_is_run_several_times_without_reports_if_none_are_wanted(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -127,6 +129,7 @@ def test_a_checked_scenario_is_run_several_times_without_reports_if_none_are_wan
     assert not any((result.folder / "report.html").exists() for result in results)
 
 
+@pytest.mark.slow
 def test_scenarios_of_one_name_get_folders_of_their_own(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

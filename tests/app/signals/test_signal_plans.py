@@ -285,6 +285,7 @@ def test_a_tllogic_with_short_intergreens_is_refused_with_both_times(
     assert "needs 8 s" in str(raised.value)
 
 
+@pytest.mark.slow
 def test_a_program_with_short_intergreens_runs_as_it_is_with_what_was_found(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -390,6 +391,7 @@ def test_stages_by_netconvert_are_timed_anew_called_and_prolonged(
         assert (first.seconds, second.seconds, light.plans[0].offset) == (20.0, 12.0, 5.0)
 
 
+@pytest.mark.slow
 def test_lights_by_netconvert_show_movements_by_segments(by_netconvert: Workspace) -> None:
     """Lanes for bicycles, which our own network does not lead through the junction, included."""
     (light,) = signal_programs(by_netconvert, placed(by_netconvert, scenario(None)))

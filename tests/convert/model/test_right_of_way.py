@@ -282,6 +282,7 @@ def test_of_two_that_meet_one_waits_or_both_in_turn_and_all_wait_for_persons(
         assert all(number in rights[link].yields_to for link in crossed)
 
 
+@pytest.mark.slow
 @given(st.lists(movements, max_size=6), all_rules)
 def test_who_waits_does_not_depend_on_the_order(listed: list[Movement], rules: Rules) -> None:
     for i, one in enumerate(listed):

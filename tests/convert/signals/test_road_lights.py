@@ -78,6 +78,7 @@ def lights_found(network: Converted) -> tuple[int, int]:
     return signals.lights, len(signals.lost_lights)
 
 
+@pytest.mark.slow
 def test_a_light_on_a_plain_road_stops_those_who_come_towards_it() -> None:
     network = made(straight("1", light(7, 80.0)))
     assert lit_links(network) == [("1.0.f", "1.1.f", 0)]

@@ -85,6 +85,7 @@ def test_a_constant_speed_on_a_straight_lane_is_plausible(step, speed):
     assert kinds(found) == []
 
 
+@pytest.mark.slow
 @given(STEPS, st.floats(8.0, 200.0), st.floats(0.2, 1.8))
 def test_a_circle_is_plausible_as_long_as_its_lateral_acceleration_is(step, radius, share):
     speed = math.sqrt(4.0 * share * radius)

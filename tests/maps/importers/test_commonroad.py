@@ -59,6 +59,7 @@ def test_what_is_wrong_is_said(content: bytes, words: str) -> None:
         read_commonroad_lanelets(content)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not SHARED.is_dir(), reason="needs the recordings of ../shared")
 @pytest.mark.parametrize(
     ("name", "lanelets"), [("USA_US101-3_3_T-1", 12), ("USA_Lanker-1_1_T-1", 91)]

@@ -146,6 +146,7 @@ def test_lanelets_are_told_from_plain_openstreetmap_by_content() -> None:
 
 
 # ----------------------------------------------------------------------------- geometry
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(
     bends=st.lists(st.floats(-0.05, 0.05), min_size=2, max_size=6),
@@ -299,6 +300,7 @@ def test_lanelets_on_a_bridge_do_not_meet_those_below() -> None:
     assert len(model.roads) == 2
 
 
+@pytest.mark.slow
 def test_a_long_ramp_connects_only_where_it_lies_on_the_road() -> None:
     file = LaneletFile()
     file.lanelet(file.way([(0, 0), (50, 0)]), file.way([(0, -4), (50, -4)]))

@@ -28,6 +28,7 @@ def test_parking_survives_being_written_and_read_and_is_left_out_without() -> No
     )
 
 
+@pytest.mark.slow
 def test_trips_that_park_on_a_map_with_places_are_in_order() -> None:
     assert codes(parking_scenario({"begin": 0.2, "end": 0.5})) == []
 

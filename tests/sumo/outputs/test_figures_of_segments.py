@@ -116,6 +116,7 @@ def of_segments(run: Run) -> pl.DataFrame:
     )
 
 
+@pytest.mark.slow
 def test_each_segment_has_what_was_driven_in_it(run: Run) -> None:
     # Who arrives does so on the last segment, within a step of which SUMO alone knows.
     there = of_segments(run).filter(col("cell") < 29)

@@ -195,6 +195,7 @@ def test_a_stem_that_is_never_empty_carries_what_an_induction_loop_counts(run):
     assert level.item() == "F", "whatever the delay"
 
 
+@pytest.mark.slow
 def test_queue_and_spillback_of_a_full_stem_are_those_of_its_vehicles_one_by_one(run):
     """The definition as it is written, step by step, on positions along the lanes."""
     net = built(MAP).sumo.net

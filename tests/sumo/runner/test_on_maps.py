@@ -70,6 +70,7 @@ def sampled(name: str, *, seed: int = 1, fill: float = 0.4) -> Scenario:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHIPPED)
 def test_sampled_actors_start_in_their_places_and_arrive(name: str, tmp_path: Path) -> None:
     prepared = prepare(

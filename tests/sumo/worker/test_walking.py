@@ -113,6 +113,7 @@ def test_persons_arrive_where_they_want_to(name: str) -> None:
         assert np.hypot(last.x - graph.x[goal], last.y - graph.y[goal]) < 1.5 + aside
 
 
+@pytest.mark.slow
 @each_map
 def test_persons_never_walk_on_a_carriageway(name: str) -> None:
     table = town(name).made.network.table

@@ -256,6 +256,7 @@ def opened(client: TestClient, name: str, **query: str) -> dict[str, bytes]:
         return {one: archive.read(one) for one in archive.namelist()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", ["1.0", "1.3"])
 def test_an_export_to_openscenario_comes_back_as_the_same_scenario(
     known: TestClient, version: str

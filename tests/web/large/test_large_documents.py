@@ -87,6 +87,7 @@ def test_a_large_upload_is_read_checked_and_saved_by_a_child(
     assert far.post("/api/scenarios/upload", **form).status_code == 409  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_what_a_child_answers_has_each_header_once_and_is_compressed_once(
     far: TestClient, sampled: str
 ) -> None:
@@ -177,6 +178,7 @@ def test_a_large_scenario_with_errors_is_not_run(far: TestClient) -> None:
     assert far.get("/api/runs").json() == []
 
 
+@pytest.mark.slow
 def test_the_forecast_of_a_large_scenario_is_that_of_a_small_one(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:

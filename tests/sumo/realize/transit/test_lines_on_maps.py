@@ -73,6 +73,7 @@ def test_without_a_timetable_a_bus_stays_for_its_dwell_time(tmp_path: Path) -> N
     assert visits["scheduled"].null_count() == visits.height
 
 
+@pytest.mark.slow
 def test_a_bus_in_a_bay_holds_up_no_other_vehicle(tmp_path: Path) -> None:
     def car(bay: bool) -> float:
         scenario = line(bay=bay, dwell=60, departures=(0,), headway=None)

@@ -131,6 +131,7 @@ def test_a_path_off_the_route_is_followed_and_sumo_leads_back_to_the_goal(tmp_pa
     assert track.x[-1] > 385.0
 
 
+@pytest.mark.slow
 def test_where_no_route_leads_on_from_the_end_of_a_path_that_is_said(tmp_path: Path) -> None:
     rules = [after(1.0, {"path": {"points": [[500.0, 300.0]], "speed": 20.0}})]
     found = run(document(MOTORWAY, [fast("van", 370.0, MIDDLE)], rules), tmp_path / "run")
@@ -170,6 +171,7 @@ def recorded(track: Track, begin: float, end: float) -> list[list[float]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_a_recorded_trajectory_is_replayed_exactly_and_traffic_reacts(
     tmp_path: Path, step: float

@@ -47,6 +47,7 @@ def gap_at_start(found: Told) -> float:
     return float(other.x[0] - other.length - ego.x[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_a_car_without_events_hits_the_stopped_one_when_the_gap_is_covered(
     tmp_path: Path, step: float
@@ -66,6 +67,7 @@ def test_a_car_without_events_hits_the_stopped_one_when_the_gap_is_covered(
     assert ego.x == pytest.approx(ego.x[0] + 15.0 * ego.time, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("first", "then", "hits"), [("sumo", "story", 1), ("story", "sumo", 0)])
 def test_a_rule_gives_a_car_to_the_story_or_to_sumo(
     tmp_path: Path, first: str, then: str, hits: int
@@ -80,6 +82,7 @@ def test_a_rule_gives_a_car_to_the_story_or_to_sumo(
         assert later == pytest.approx(later[0], abs=0.01)
 
 
+@pytest.mark.slow
 def test_after_a_rule_the_story_keeps_what_the_rule_left(tmp_path: Path) -> None:
     """Braked to 5 m/s and released it stays at 5 m/s, however free the road is."""
     actors = [car("ego", 370.0, 15.0, ego=True)]
