@@ -18,6 +18,7 @@ from odscen.figures.measures.registry import figure_values
 from odscen.figures.measures.summary import actors_from_json
 from odscen.figures.measures.timetable import stops_served
 from odscen.runs.measured import read_run_data
+from odscen.runs.run_settings import RunSettings
 from odscen.sumo.runner.prepare import prepare
 from odscen.sumo.runner.run_jobs import run_prepared
 from tests.parking_case import PLACES, parking_scenario, parking_town
@@ -38,7 +39,9 @@ def run_both(
     scenario: Scenario, sumo_map: SumoMap, net: Path, folder: Path
 ) -> tuple[RunData, list[ET.Element]]:
     """Our figures of a run, and the stops that plain SUMO writes of it."""
-    done = run_prepared(prepare(scenario, sumo_map, net), folder / "run")
+    # In long steps nothing steers vehicles but SUMO, so that it drives the same by itself.
+    settings = RunSettings(step_length=1.0)
+    done = run_prepared(prepare(scenario, sumo_map, net, settings=settings), folder / "run")
     subprocess.run(
         [BIN / "sumo", "-c", "sumo/scenario.sumocfg"], cwd=done.folder, check=True,
         capture_output=True,
