@@ -43,6 +43,7 @@ ALL = (
     "carla_mirror",
     "foreign_poses",
     "canvas",
+    "scenery",
     "in_browser",
     "editing",
 )

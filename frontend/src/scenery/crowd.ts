@@ -2,6 +2,7 @@ import {
   AdditiveBlending,
   type BufferGeometry,
   Color,
+  type Frustum,
   Group,
   InstancedMesh,
   type Material,
@@ -9,6 +10,7 @@ import {
   MeshBasicMaterial,
   MeshLambertMaterial,
   Quaternion,
+  Sphere,
   Vector3,
 } from "three";
 
@@ -17,12 +19,16 @@ import { nth } from "../lists";
 import { CATEGORY_COLOR } from "../map/colors";
 import { FLAG_BRAKE, FLAG_LEFT, FLAG_RIGHT } from "../map/movingLayer";
 import type { Moving } from "../map/scene";
-import { body, brakeLamps, HEIGHT, headLamps, indicators, lightPool } from "./bodies";
+import { body, brakeLamps, farBody, HEIGHT, headLamps, indicators, lightPool } from "./bodies";
 import type { Carried } from "./cameras";
 import type { Origin } from "./ground";
 import type { Heights } from "./heights";
 
 const [UP, ACROSS] = [new Vector3(0, 0, 1), new Vector3(0, 1, 0)];
+/** Pixels of a length from which on a body has wheels, windows and lamps. */
+const DETAILED = 18;
+/** How far lamps light up the road, m. */
+const POOL = 25;
 const RIDDEN = new Set(["bicycle", "pedestrian"]);
 
 /** Many bodies of one shape, as many as there are at the moment. */
@@ -56,9 +62,21 @@ class Bodies {
   end(): void {
     if (!this.mesh) return;
     this.mesh.count = this.rows;
-    this.mesh.instanceMatrix.needsUpdate = true;
-    if (this.mesh.instanceColor) this.mesh.instanceColor.needsUpdate = true;
+    for (const sent of [this.mesh.instanceMatrix, this.mesh.instanceColor]) {
+      if (!sent) continue;
+      sent.clearUpdateRanges();
+      sent.addUpdateRange(0, this.rows * sent.itemSize);
+      sent.needsUpdate = this.rows > 0;
+    }
   }
+}
+
+/** What a camera sees. */
+export interface Sight {
+  frustum: Frustum;
+  eye: Vector3;
+  /** Pixels of a metre that is a metre away. */
+  span: number;
 }
 
 /** All road users of a moment, as bodies with lamps. */
@@ -67,8 +85,13 @@ export class CrowdOfBodies {
   /** Whether lamps are on. */
   dark = false;
   private readonly bodies: readonly Bodies[];
+  /** What is too far away for details. */
+  private readonly far: Bodies;
   private readonly lamps: Record<"brake" | "left" | "right" | "front" | "pool", Bodies>;
   private readonly colors = new Map<string, Color>();
+  /** The moment that was shown last, and where its road users are. */
+  private moving: Moving | null = null;
+  private placed: (Carried | undefined)[] = [];
 
   constructor(
     private readonly origin: Origin,
@@ -77,6 +100,7 @@ export class CrowdOfBodies {
     const painted = new MeshLambertMaterial({ vertexColors: true });
     const glowing = (color: number): MeshBasicMaterial => new MeshBasicMaterial({ color });
     this.bodies = CATEGORIES.map((category) => new Bodies(this.group, body(category), painted));
+    this.far = new Bodies(this.group, farBody(), painted);
     const mirrored = indicators().scale(1, -1, 1);
     mirrored.setIndex([...Array(mirrored.getAttribute("position").count).keys()].reverse());
     this.lamps = {
@@ -98,20 +122,34 @@ export class CrowdOfBodies {
     };
   }
 
-  /** Places all of a moment; `hidden` is the row of who looks out of its own eyes, or -1. */
-  show(moving: Moving, hidden: number): void {
-    const all = [...this.bodies, ...Object.values(this.lamps)];
+  /** Places all of a moment that a camera sees; `hidden` is the row of who looks out of its own eyes, or -1. */
+  show(moving: Moving, hidden: number, { frustum, eye, span }: Sight): void {
+    if (this.moving !== moving) {
+      this.moving = moving;
+      this.placed = new Array<Carried | undefined>(moving.count);
+    }
+    const all = [...this.bodies, this.far, ...Object.values(this.lamps)];
     for (const one of all) one.begin(moving.count);
     const { group, colors } = moving.tint ?? { group: moving.category, colors: KIND_COLORS };
     const at = new Matrix4();
+    const ball = new Sphere();
+    const { lowest, highest } = this.heights;
+    // With what its lamps light up.
+    const beyond = (highest - lowest) / 2 + (this.dark ? POOL : HEIGHT.truck);
     for (let row = 0; row < moving.count; row++) {
       if (row === hidden) continue;
-      const who = this.carried(moving, row);
-      nth(this.bodies, nth(moving.category, row)).add(
+      const [x, y, length] = [0, 1, 3].map((k) => nth(moving.pose, 5 * row + k)) as [number, number, number];
+      // Where it is on the ground takes longer to find than whether it can be in sight.
+      ball.center.set(x - this.origin[0], y - this.origin[1], (lowest + highest) / 2);
+      ball.radius = length + beyond;
+      if (!frustum.intersectsSphere(ball)) continue;
+      const who = (this.placed[row] ??= this.carried(moving, row));
+      const detailed = who.length * span > DETAILED * ball.center.distanceTo(eye);
+      (detailed ? nth(this.bodies, nth(moving.category, row)) : this.far).add(
         placed(at, who, who.length, who.width, HEIGHT[who.category]),
         this.color(nth(colors, nth(group, row))),
       );
-      if (!RIDDEN.has(who.category)) this.addLamps(at, who, nth(moving.flags, row));
+      if (!RIDDEN.has(who.category)) this.addLamps(at, who, detailed ? nth(moving.flags, row) : 0);
     }
     for (const one of all) one.end();
   }

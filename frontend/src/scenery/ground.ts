@@ -10,25 +10,28 @@ export type HeightAt = (x: number, y: number) => number;
 /** Where the middle of the scene is on the map, metres: floats of the graphics are too short for both. */
 export type Origin = readonly [x: number, y: number];
 
-/** Longest edge of a surface that follows a ground which is not flat, m. */
-const LONGEST = 6;
+/** Longest piece of a line, and edge of a surface, that follows a ground which is not flat, m. */
+const [LONGEST, WIDEST] = [6, 60];
+/** How far an edge may be from the ground, m: less than the paint is above it. */
+const BULGE = 0.015;
+/** Cuts of a triangle into halves at most: slivers would never end. */
+const MOST_CUTS = 14;
+/** Side of a square whose triangles are drawn together, m. */
+const SQUARE = 250;
+/** Numbers of a triangle. */
+const CORNERS = 9;
 
-/** Filled rings that lie on the ground. */
-export function surface(
-  packed: PackedLines,
-  origin: Origin,
-  height: HeightAt,
-  flat: boolean,
-): BufferGeometry {
+/** Filled rings that lie on the ground: corners of triangles. */
+export function surface(packed: PackedLines, origin: Origin, height: HeightAt, flat: boolean): number[] {
   const places: number[] = [];
   for (const ring of ringsOf(unpack(packed), origin)) {
     for (const corners of ShapeUtils.triangulateShape(ring, [])) {
       const triangle = corners.map((corner) => nth(ring, corner));
-      for (const { x, y } of flat ? upwards(triangle) : divided(upwards(triangle)))
+      for (const { x, y } of flat ? upwards(triangle) : divided(upwards(triangle), height))
         places.push(x, y, height(x, y));
     }
   }
-  return withUpNormals(places);
+  return places;
 }
 
 /** Rings raised to walls with a roof. */
@@ -56,7 +59,7 @@ export function blocks(
   return made;
 }
 
-/** Lines of a width that lie on the ground, whole or broken (painted, gap; metres). */
+/** Lines of a width that lie on the ground, whole or broken (painted, gap; metres): corners of triangles. */
 export function ribbons(
   packed: PackedLines,
   width: number,
@@ -64,7 +67,7 @@ export function ribbons(
   origin: Origin,
   height: HeightAt,
   flat: boolean,
-): BufferGeometry {
+): number[] {
   const places: number[] = [];
   const lines = unpack(packed);
   for (let k = 0; k + 1 < lines.start.length; k++)
@@ -80,7 +83,7 @@ export function ribbons(
       ] as const;
       places.push(...p, ...q, ...r, ...p, ...r, ...s);
     }
-  return withUpNormals(places);
+  return places;
 }
 
 /** Painted pieces of a line, none longer than `most`. */
@@ -109,20 +112,39 @@ export function strokes(
   return made;
 }
 
-/** Triangles of which no edge is longer than {@link LONGEST}; neighbours share their edges still. */
-export function divided(triangle: readonly Vector2[]): Vector2[] {
+/** Triangles whose edges all lie on the ground; neighbours share their edges still. */
+export function divided(triangle: readonly Vector2[], height: HeightAt, cuts = MOST_CUTS): Vector2[] {
   const [a, b, c] = [nth(triangle, 0), nth(triangle, 1), nth(triangle, 2)];
   const edges = [
     [a, b, c],
     [b, c, a],
     [c, a, b],
   ] as const;
-  const [from, to, other] = edges.reduce((longest, edge) =>
+  // What is cut depends on an edge alone, so that both its sides cut it in the same place.
+  const bent = cuts > 0 ? edges.filter(([from, to]) => leavesGround(from, to, height)) : [];
+  if (bent.length === 0) return [a, b, c];
+  const [from, to, other] = bent.reduce((longest, edge) =>
     edge[0].distanceTo(edge[1]) > longest[0].distanceTo(longest[1]) ? edge : longest,
   );
-  if (from.distanceTo(to) <= LONGEST) return [a, b, c];
   const middle = from.clone().add(to).multiplyScalar(0.5);
-  return [...divided([from, middle, other]), ...divided([middle, to, other])];
+  return [
+    ...divided([from, middle, other], height, cuts - 1),
+    ...divided([middle, to, other], height, cuts - 1),
+  ];
+}
+
+function leavesGround(from: Vector2, to: Vector2, height: HeightAt): boolean {
+  const long = from.distanceTo(to);
+  if (long < LONGEST) return false;
+  if (long > WIDEST) return true;
+  const [low, high] = [height(from.x, from.y), height(to.x, to.y)];
+  const pieces = Math.ceil(long / (LONGEST / 2));
+  for (let k = 1; k < pieces; k++) {
+    const share = k / pieces;
+    const ground = height(from.x + share * (to.x - from.x), from.y + share * (to.y - from.y));
+    if (Math.abs(ground - low - share * (high - low)) > BULGE) return true;
+  }
+  return false;
 }
 
 /** Counterclockwise, so that it is seen from above. */
@@ -148,12 +170,36 @@ function pointsOf(lines: Lines, k: number, [x, y]: Origin): Vector2[] {
   return points;
 }
 
-/** Triangles that are lit as if they were level, so that they show no facets. */
-export function withUpNormals(places: readonly number[]): BufferGeometry {
+/** Triangles by squares of the ground, so that what is out of sight is not drawn. */
+export function tiles(triangles: readonly number[]): BufferGeometry[] {
+  const squares = new Map<string, number[]>();
+  for (let i = 0; i < triangles.length; i += CORNERS) {
+    const corners = triangles.slice(i, i + CORNERS);
+    const key = [0, 1].map((axis) => Math.floor(nth(corners, axis) / SQUARE)).join();
+    const square = squares.get(key);
+    if (square) square.push(...corners);
+    else squares.set(key, corners);
+  }
+  return [...squares.values()].map(sharingCorners);
+}
+
+/** A surface in which triangles that meet have their corners in common. */
+function sharingCorners(places: readonly number[]): BufferGeometry {
+  const numbers = new Map<string, number>();
+  const corners: number[] = [];
+  const index: number[] = [];
+  for (let i = 0; i < places.length; i += 3) {
+    const corner = places.slice(i, i + 3);
+    const key = corner.join();
+    const known = numbers.get(key);
+    index.push(known ?? numbers.size);
+    if (known !== undefined) continue;
+    numbers.set(key, numbers.size);
+    corners.push(...corner);
+  }
   const made = new BufferGeometry();
-  const normals = new Float32Array(places.length);
-  for (let i = 2; i < normals.length; i += 3) normals[i] = 1;
-  made.setAttribute("position", new BufferAttribute(new Float32Array(places), 3));
-  made.setAttribute("normal", new BufferAttribute(normals, 3));
+  made.setAttribute("position", new BufferAttribute(new Float32Array(corners), 3));
+  made.setIndex(index);
+  made.computeBoundingSphere();
   return made;
 }

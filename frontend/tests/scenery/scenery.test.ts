@@ -1,10 +1,11 @@
-import { PerspectiveCamera, Vector2, Vector3 } from "three";
+import { BufferAttribute, PerspectiveCamera, Vector2, Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 
 import { toScreen } from "../../src/map/view";
 import { above, ANGLE, behind, type Carried, seat } from "../../src/scenery/cameras";
-import { divided, strokes, surface } from "../../src/scenery/ground";
+import { divided, strokes, surface, tiles } from "../../src/scenery/ground";
 import { Heights } from "../../src/scenery/heights";
+import { Sharpness } from "../../src/scenery/sharpness";
 import { skyOf } from "../../src/scenery/weather";
 
 const NO_WALKS = { x: [], y: [], hdg: [] } as never;
@@ -133,7 +134,7 @@ describe("ground", () => {
 
   test("a surface covers its ring and lies at the height of each corner", () => {
     const made = surface(square, [10, 10], (x) => 0.1 * x, false);
-    const at = made.getAttribute("position");
+    const at = new BufferAttribute(new Float32Array(made), 3);
     let area = 0;
     for (let i = 0; i < at.count; i += 3) {
       const [a, b, c] = [0, 1, 2].map((k) => new Vector3().fromBufferAttribute(at, i + k)) as [
@@ -147,20 +148,52 @@ describe("ground", () => {
     expect(area).toBeCloseTo(1600, 3);
   });
 
-  test("triangles are divided until no edge is long, and keep their area", () => {
-    const parts = divided([new Vector2(0, 0), new Vector2(500, 0), new Vector2(500, 3.5)]);
+  const AREA = 875;
+  const LONG = [new Vector2(0, 0), new Vector2(500, 0), new Vector2(500, 3.5)];
+
+  function edgesOf(parts: readonly Vector2[]): { area: number; edges: [Vector2, Vector2][] } {
     let area = 0;
+    const edges: [Vector2, Vector2][] = [];
     for (let i = 0; i < parts.length; i += 3) {
       const [a, b, c] = parts.slice(i, i + 3) as [Vector2, Vector2, Vector2];
       area += Math.abs((b.x - a.x) * (c.y - a.y) - (c.x - a.x) * (b.y - a.y)) / 2;
-      for (const [one, other] of [
-        [a, b],
-        [b, c],
-        [c, a],
-      ] as const)
-        expect(one.distanceTo(other)).toBeLessThanOrEqual(6);
+      edges.push([a, b], [b, c], [c, a]);
     }
-    expect(area).toBeCloseTo(875, 6);
+    return { area, edges };
+  }
+
+  test("triangles are divided where the ground is bent, keep their area and follow it within 2 cm", () => {
+    const hill = (x: number): number =>
+      x > 200 && x < 300 ? (x - 200) ** 2 / 2000 : x >= 300 ? x / 10 - 25 : 0;
+    const { area, edges } = edgesOf(divided(LONG, hill));
+    expect(area).toBeCloseTo(AREA, 6);
+    for (const [from, to] of edges)
+      for (const share of [0.25, 0.5, 0.75]) {
+        const straight = hill(from.x) + share * (hill(to.x) - hill(from.x));
+        expect(Math.abs(hill(from.x + share * (to.x - from.x)) - straight)).toBeLessThan(0.02);
+      }
+    const bent = edges.filter(([{ x }]) => x > 200 && x < 300).length;
+    expect(bent).toBeGreaterThan(edges.length / 2);
+  });
+
+  test("on even ground, level or not, triangles are cut into few, and a ground that jumps ends too", () => {
+    const { area, edges } = edgesOf(divided(LONG, (x, y) => 0.1 * x + 0.02 * y));
+    expect(area).toBeCloseTo(AREA, 6);
+    expect(edges.length / 3).toBeLessThan(100);
+    expect(edgesOf(divided(LONG, (x) => Math.floor(x / 8) % 2)).area).toBeCloseTo(AREA, 6);
+  });
+
+  test("triangles are drawn by squares of the ground, each in one of them", () => {
+    const all = surface(square, [10, 10], () => 0, true);
+    const far = all.map((value, k) => (k % 3 === 0 ? value + 1000 : value));
+    const made = tiles([...all, ...far]);
+    expect(made.length).toBeGreaterThanOrEqual(2);
+    const corners = made.reduce((sum, one) => sum + one.getAttribute("position").count, 0);
+    expect(corners * 3).toBe(2 * all.length);
+    for (const one of made) {
+      one.computeBoundingSphere();
+      expect(one.boundingSphere?.radius).toBeLessThan(400);
+    }
   });
 
   test("a broken line is painted and left out in turn, over its corners too", () => {
@@ -187,4 +220,16 @@ test("noon is bright and dry, night has lamps on, rain hides the sun and wets th
   expect([noon.rain, noon.wet]).toEqual([0, 0]);
   expect([rain.rain, rain.wet]).toEqual([0.8, 0.9]);
   expect(skyOf({ fog_density: 90 }).fog).toBeGreaterThan(10 * noon.fog);
+});
+
+test("a picture that takes too long is drawn coarser, one that takes little as sharp as the screen again", () => {
+  const sharpness = new Sharpness(2);
+  for (let k = 0; k < 30; k++) if (sharpness.isDue()) sharpness.adapt(80);
+  expect(sharpness.ratio).toBeLessThan(1.4);
+  for (let k = 0; k < 100; k++) if (sharpness.isDue()) sharpness.adapt(80);
+  expect(sharpness.ratio).toBeCloseTo(1, 6);
+  for (let k = 0; k < 12; k++) if (sharpness.isDue()) sharpness.adapt(20);
+  expect(sharpness.ratio).toBeCloseTo(1, 6);
+  for (let k = 0; k < 60; k++) if (sharpness.isDue()) sharpness.adapt(5);
+  expect(sharpness.ratio).toBe(2);
 });
