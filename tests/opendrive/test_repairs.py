@@ -137,3 +137,12 @@ def test_the_whole_crossing_without_any_table_is_repaired() -> None:
     odr = parse(bare)
     assert lane_successors(odr) == lane_successors(parse(sound))
     assert sum("[junction-table]" in note for note in odr.notes) == 2 * len(OPPOSITE)
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_road_of_a_junction_is_a_plain_road_only_if_nothing_is_linked_to_it(linked: bool) -> None:
+    link = '<successor elementType="junction" elementId="5"/>' if linked else ""
+    alone, other = road("7", junction="5"), road("8", link=link)
+    odr = parse(document(alone, other, '<junction id="5" name="none"/>'))
+    assert odr.roads[RoadId("7")].junction == ("5" if linked else None)
+    assert any("outside junctions" in note for note in odr.notes) is not linked

@@ -21,7 +21,7 @@ from odscen.opendrive.parse_junctions import parse_controller, parse_junction
 from odscen.opendrive.parse_left_out import RoadFault, leave_out_faulty
 from odscen.opendrive.parse_lengths import fit_lengths
 from odscen.opendrive.parse_references import check_references
-from odscen.opendrive.parse_repairs import repair_junction_tables
+from odscen.opendrive.parse_repairs import free_roads_of_no_junction, repair_junction_tables
 from odscen.opendrive.parse_road import parse_road
 from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule
 from odscen.opendrive.parse_xml import (
@@ -203,7 +203,8 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
     check_numbers(roads, notes)
     roads = merge_coincident_roads(roads, junctions.values(), notes)
     roads, junctions, controllers = check_references(roads, junctions, controllers, notes)
-    odr = repair_junction_tables(OpenDrive(header, roads, junctions, controllers), notes)
+    odr = free_roads_of_no_junction(OpenDrive(header, roads, junctions, controllers), notes)
+    odr = repair_junction_tables(odr, notes)
     return replace(odr, notes=notes.sentences())
 
 

@@ -3,7 +3,7 @@
 A lane of a connecting road that leads to no lane, or that no lane leads to, is joined to the lane
 at which it ends or begins, if exactly one lane meets it there, of the road that the connecting
 road's own link names, or of any road outside junctions if it names none. Whatever leads somewhere
-stays as it is.
+stays as it is. Roads of a junction that is linked to nothing are roads outside junctions.
 """
 
 from __future__ import annotations
@@ -83,6 +83,33 @@ def repair_junction_tables(odr: OpenDrive, notes: Notes) -> OpenDrive:
             )
             notes.add(Rule.JUNCTION_TABLE, place, detail)
     return repaired
+
+
+def free_roads_of_no_junction(odr: OpenDrive, notes: Notes) -> OpenDrive:
+    """Read roads of a junction without connections, to which nothing is linked, as plain roads.
+
+    Nobody could enter such a junction, or its roads, otherwise.
+    """
+    linked = {
+        link.element_id
+        for road in odr.roads.values()
+        for link in (road.predecessor, road.successor)
+        if link is not None and link.element_type == "junction"
+    }
+    roads = dict(odr.roads)
+    for road in odr.roads.values():
+        junction = None if road.junction is None else odr.junctions.get(road.junction)
+        if junction is None or junction.connections or junction.id in linked:
+            continue
+        if road.predecessor is not None or road.successor is not None:
+            continue
+        detail = (
+            f"junction {shown_id(junction.id)} has no connection and no road is linked to it; "
+            "read as a road outside junctions"
+        )
+        notes.add(Rule.JUNCTION_TABLE, f"road {shown_id(road.id)}", detail)
+        roads[road.id] = replace(road, junction=None)
+    return replace(odr, roads=roads) if roads != odr.roads else odr
 
 
 def _find_meetings(odr: OpenDrive, found: Iterable[DeadEnd]) -> list[_Meeting]:
