@@ -123,7 +123,8 @@ class CalmTraffic(Simulator[CalmRun]):
     def unsupported(self, scenario: Scenario, on: SimulatedMap) -> Iterator[Problem]:  # type: ignore[override]
         """List what it leaves out."""
         del on
-        yield warning("calm", "map", "Calm traffic sees no light, sign or right of way")
+        words = "sees no light, sign, right of way or merge: where ways meet, bodies may overlap"
+        yield warning("calm", "map", f"Calm traffic {words}")
         for index, rule in enumerate(scenario.rules):
             words = f"Calm traffic does not follow rule {rule.id} of {rule.actor}"
             yield warning("calm", f"rules[{index}]", words)

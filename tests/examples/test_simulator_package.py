@@ -84,7 +84,7 @@ def test_its_model_is_driven_and_its_weather_makes_all_slower(
             reporter=listener,
         )  # fmt: skip
         assert runs[weather].status == "completed"
-        assert "Calm traffic sees no light, sign or right of way" in listener.words
+        assert any("bodies may overlap" in words for words in listener.words)
     clear, fog = runs["ClearNoon"], runs[WEATHER]
     plan = json.loads((fog.folder / "plan.json").read_text())
     (bus,) = [row for row in plan["actors"] if row.get("model") == MODEL]
