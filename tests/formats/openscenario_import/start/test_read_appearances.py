@@ -205,10 +205,11 @@ def test_a_clothoid_is_sampled_and_says_how_far_it_is_off(
     (rule,) = (one for one in found.scenario.rules if one.id == "e")
     assert rule.then[0].path is not None
     x, y = map(float, rule.then[0].path.points[-1])
-    front = 2.5
     turn = 0.5
-    assert x == pytest.approx(101 + 100 * math.sin(turn) + front * math.cos(turn), abs=0.5)
-    assert y == pytest.approx(-1.75 + 100 * (1 - math.cos(turn)) + front * math.sin(turn), abs=0.5)
+    # The reference point is led along the curve itself, half a body behind the front.
+    assert x == pytest.approx(101 + 100 * math.sin(turn), abs=0.01)
+    assert y == pytest.approx(-1.75 + 100 * (1 - math.cos(turn)), abs=0.01)
+    assert rule.then[0].path.behind == 2.5
     words = "a polyline of points up to 1 m apart, up to 0.001 m off the curve"
     assert words in reasons(found, "approximated")
 
