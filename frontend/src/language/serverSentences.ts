@@ -823,6 +823,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "junction {getid} has requests {rows}" }),
   msg({ message: "junction {id}" }),
   msg({ message: "junction {id} > connection {id2}" }),
+  msg({ message: "junction {id} has no connection and no road is linked to it; read as a road outside junctions" }),
   msg({ message: "junction {number} > road {id}" }),
   msg({ message: "junction {number} group {sequence}" }),
   msg({ message: "kind must be one of {tablekind}, not {kind}" }),
