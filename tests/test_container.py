@@ -29,6 +29,7 @@ def sent() -> list[str]:
     return context_files((ROOT / ".dockerignore").read_text(), committed_files())
 
 
+@pytest.mark.slow
 def test_the_context_has_all_that_the_wheel_is_built_from_and_nothing_else(sent: list[str]) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())
     hatch = project["tool"]["hatch"]

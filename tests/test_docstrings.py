@@ -27,12 +27,25 @@ def module_name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-TEXTS = {module_name(path): path.read_text("utf-8") for path in sorted(SOURCES.rglob("*.py"))}
-TREES = {module: ast.parse(text) for module, text in TEXTS.items()}
-NODES = {module: list(ast.walk(tree)) for module, tree in TREES.items()}
-CLASSES = {
-    node.name: node for nodes in NODES.values() for node in nodes if isinstance(node, ast.ClassDef)
-}
+@cache
+def texts() -> dict[str, str]:
+    """Every module of the source, read when a test asks: each worker collects all tests."""
+    return {module_name(path): path.read_text("utf-8") for path in sorted(SOURCES.rglob("*.py"))}
+
+
+@cache
+def nodes_of_modules() -> dict[str, list[ast.AST]]:
+    return {module: list(ast.walk(ast.parse(text))) for module, text in texts().items()}
+
+
+@cache
+def classes() -> dict[str, ast.ClassDef]:
+    return {
+        node.name: node
+        for nodes in nodes_of_modules().values()
+        for node in nodes
+        if isinstance(node, ast.ClassDef)
+    }
 
 
 def sections(docstring: str) -> dict[str, list[str]]:
@@ -57,7 +70,7 @@ def members(node: ast.ClassDef) -> set[str]:
     """Fields, methods, and what ``self`` is given, of a class and of its bases that are ours."""
     names: set[str] = set()
     for base in node.bases:
-        known = CLASSES.get(ast.unparse(base).split(".")[-1].split("[")[0])
+        known = classes().get(ast.unparse(base).split(".")[-1].split("[")[0])
         names |= members(known) if known is not None and known is not node else set()
     for one in node.body:
         if isinstance(one, ast.AnnAssign):
@@ -83,7 +96,7 @@ def taken(node: Documented) -> set[str]:
 
 
 def documented() -> Iterator[tuple[str, Documented, dict[str, list[str]]]]:
-    for module, nodes in NODES.items():
+    for module, nodes in nodes_of_modules().items():
         for node in nodes:
             if isinstance(node, Documented) and (text := ast.get_docstring(node)):
                 yield f"{module}.{node.name}", node, sections(text)
@@ -110,7 +123,7 @@ def test_every_attribute_that_is_described_is_there() -> None:
 
 
 def test_every_exception_that_is_described_exists() -> None:
-    known = {*CLASSES, *dir(builtins)}
+    known = {*classes(), *dir(builtins)}
     wrong = [
         f"{name}: {exception}"
         for name, _, found in documented()
@@ -149,7 +162,7 @@ def test_who_raises_says_so() -> None:
 def names_of(module: str) -> frozenset[str]:
     """What a module defines or imports, and the members of its classes as ``Class.member``."""
     names: set[str] = set()
-    for node in NODES[module]:
+    for node in nodes_of_modules()[module]:
         if isinstance(node, ast.ClassDef):
             names |= {node.name, *(f"{node.name}.{member}" for member in members(node))}
         elif isinstance(node, Function):
@@ -164,19 +177,19 @@ def names_of(module: str) -> frozenset[str]:
 def resolves(target: str, module: str) -> bool:
     start, _, rest = target.partition(".")
     if start == "odscen":
-        return target in TREES or any(
+        return target in texts() or any(
             target.startswith(f"{one}.") and target.removeprefix(f"{one}.") in names_of(one)
-            for one in TREES
+            for one in texts()
         )
     if target in names_of(module) or any(n.endswith(f".{target}") for n in names_of(module)):
         return True
-    return rest in members(CLASSES[start]) if start in CLASSES else installed(target)
+    return rest in members(classes()[start]) if start in classes() else installed(target)
 
 
 def test_what_is_referred_to_is_there() -> None:
     wrong = [
         f"{module}: {target}"
-        for module, text in TEXTS.items()
+        for module, text in texts().items()
         for words in _ROLE.findall(text)
         if not resolves(target := words.rpartition("<")[2].strip(">()"), module)
     ]

@@ -32,6 +32,7 @@ FILES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(FILES))
 def test_damage_follows_from_the_seed_alone(name: str) -> None:
     changes = MAP if name == "a.xodr" else changes_for(name)
@@ -85,6 +86,7 @@ def own_limits() -> Limits:
     return Limits(own={child.pid for child in psutil.Process().children()})
 
 
+@pytest.mark.slow
 def test_a_batch_finds_what_its_trials_find_alone(tmp_path: Path) -> None:
     """Trials of one target in one process end as they do one by one."""
     limits = own_limits()

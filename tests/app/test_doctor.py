@@ -143,6 +143,7 @@ def test_what_users_delete_to_save_room_is_not_damage(pair: RunPair, tmp_path: P
         compare(run, pair.finished)
 
 
+@pytest.mark.slow
 def test_reports_and_comparisons_of_an_interrupted_run_say_how_to_resume_it(pair: RunPair) -> None:
     words = rf"is interrupted at 0:00 of 0:00 h; odscen resume {pair.interrupted} resumes it"
     with pytest.raises(InputError, match=words):

@@ -138,6 +138,7 @@ def test_installed_generators_are_listed_with_their_options_and_what_fails() -> 
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("installed")
 def test_options_reach_the_generator(workspace: Workspace, tmp_path: Path) -> None:
     def actors(**options: bool | float | str) -> list[Actor]:
@@ -211,6 +212,7 @@ def test_an_error_of_a_class_ends_in_a_message(workspace: Workspace, tmp_path: P
     assert said == f"{__name__}:Failing: it failed: RuntimeError('no weights')"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -278,6 +280,7 @@ def broken(rng: np.random.Generator) -> bytes:
     return data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100))
 def test_of_a_hundred_broken_fills_each_is_repaired_or_refused_with_a_reason(
     workspace: Workspace, seed: int

@@ -18,6 +18,7 @@ from odscen.scenario.templates.template_registry import TEMPLATES
 from tests.app.conftest import CROSSING
 
 
+@pytest.mark.slow
 def test_a_sampled_scenario_comes_back_byte_for_byte_from_a_file(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

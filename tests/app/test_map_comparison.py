@@ -35,6 +35,7 @@ def test_the_same_trips_run_on_both_networks_and_the_map_stays_as_it_is(place: W
     assert place.map_names() == ["signal_crossing"]
 
 
+@pytest.mark.slow
 def test_what_each_lost_is_measured_on_the_same_map(place: Workspace) -> None:
     place.add_map(MAPS / "t_junction_signs.xodr")
     data = compare_converters(place, "t_junction_signs", settings=NO_RUNS).to_dict()

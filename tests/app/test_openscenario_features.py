@@ -99,6 +99,7 @@ def weather(rain: str, friction: float) -> str:
     return text.removeprefix("<Private><PrivateAction/></Private>")
 
 
+@pytest.mark.slow
 def test_weather_time_and_road_are_those_of_the_scenario(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -386,6 +387,7 @@ def test_who_follows_a_route_against_the_road_looks_along_the_route(tmp_path: Pa
     assert rule(found, "near")["when"]["reaches"]["place"] == pytest.approx((98.6, 1.75), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_walker_without_a_speed_stands_on_its_trajectory(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -554,6 +556,7 @@ def test_speeds_change_no_faster_than_the_performance_of_a_vehicle(
     assert said == (value in (7.5, 4.0))
 
 
+@pytest.mark.slow
 def test_a_gap_without_limits_is_there_from_the_start_and_held_when_the_other_one_brakes(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -589,6 +592,7 @@ def test_a_start_against_a_lane_without_an_opposite_one_is_said(
     assert any("heads against it" in reason for reason in reasons(found, "approximated"))
 
 
+@pytest.mark.slow
 def test_who_follows_a_trajectory_at_a_negative_speed_reverses_along_it_far_beside_all_lanes(
     workspace: Workspace, tmp_path: Path
 ) -> None:

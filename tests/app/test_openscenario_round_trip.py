@@ -78,6 +78,7 @@ def _indexed(scenario: Scenario, place: tuple[str, ...]) -> str:
     return ".".join(place)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("template", PLACES)
 def test_a_template_comes_back_but_for_what_the_export_lists(
@@ -174,6 +175,7 @@ def test_weather_and_time_come_back_unless_the_file_is_changed(
     assert changed.parameters["fog_density"] == pytest.approx(56.542, abs=0.01)
 
 
+@pytest.mark.slow
 def test_who_departs_later_and_what_begins_with_another_rule_come_back(tmp_path: Path) -> None:
     goal = node_at("town_5x5", 390.0, 103.4)
     actors = [

@@ -96,6 +96,7 @@ def test_who_overtakes_in_the_opposite_lane_stays_there_until_it_cuts_in(
     assert other["speed"][-1] == pytest.approx(20.0 - 2.0 * (time[-1] - end), abs=0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "target",
     ['<AbsoluteTargetLane value="1"/>', '<RelativeTargetLane entityRef="Other" value="1"/>'],
@@ -136,6 +137,7 @@ def test_the_cut_ins_of_esmini_from_the_opposite_lane_happen(
     assert np.all(np.diff(x) > 0.0)
 
 
+@pytest.mark.slow
 def test_one_that_comes_against_a_lane_from_a_place_of_parameters_stays_in_it(
     workspace: Workspace, tmp_path: Path
 ) -> None:
@@ -157,6 +159,7 @@ def test_one_that_comes_against_a_lane_from_a_place_of_parameters_stays_in_it(
     assert np.diff(other["x"].to_numpy()) / passed == pytest.approx(-20.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_whose_trajectory_ends_in_the_opposite_lane_goes_on_there_and_does_not_turn_round(
     workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -97,6 +97,7 @@ def test_the_arrays_have_every_recorded_state(exports: Path, recorded: States) -
     assert json.loads(str(arrays["about"]))["interpolated"] is False
 
 
+@pytest.mark.slow
 def test_the_arrays_are_those_of_the_document(exports: Path) -> None:
     arrays = read_arrays(_file(exports, "pyg/*.npz"))
     hold_against_document(arrays, "Arrays of a run")
@@ -338,6 +339,7 @@ def test_the_osi_trace_shows_one_bulb_of_each_light(exports: Path) -> None:
         assert sum(lit for _, lit in bulbs) == 1
 
 
+@pytest.mark.slow
 def test_an_mcap_trace_has_the_same_messages_and_describes_them(
     workspace: Workspace, run: Run, exports: Path, tmp_path: Path
 ) -> None:
@@ -420,6 +422,7 @@ def test_a_window_that_cannot_be_is_refused(
         export_run(workspace, run.folder, tmp_path, to="waymo", options=window)
 
 
+@pytest.mark.slow
 def test_of_a_folder_of_runs_each_is_written_into_a_folder_of_its_own(
     workspace: Workspace, run: Run, exports: Path, tmp_path: Path
 ) -> None:

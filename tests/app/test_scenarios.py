@@ -26,6 +26,7 @@ def test_each_of_several_scenarios_can_be_made_again_alone(
     assert scenario_files([tmp_path / "three"]) == made
 
 
+@pytest.mark.slow
 def test_a_map_that_is_named_is_the_only_one_that_is_read(
     workspace: Workspace, tmp_path: Path
 ) -> None:

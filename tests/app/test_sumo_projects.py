@@ -120,6 +120,7 @@ def scenario(imported: ImportedFile) -> Scenario:
     return imported.scenario
 
 
+@pytest.mark.slow
 def test_a_project_opens_with_a_map_that_has_its_network(
     store: Workspace, project: Path, scenario: Scenario
 ) -> None:
@@ -282,6 +283,7 @@ def finished(store: Workspace, scenario: Scenario) -> Run:
     return run(store, scenario)
 
 
+@pytest.mark.slow
 def test_the_run_is_that_of_sumo_alone(finished: Run, original: Original) -> None:
     assert_agrees(finished, original)
     rows = {row["id"]: row for row in finished.actors().to_dicts()}
@@ -334,6 +336,7 @@ def test_whom_sumo_ignores_in_a_route_file_is_named_and_not_planned(
     ]
 
 
+@pytest.mark.slow
 def test_whom_a_calibrator_removes_as_they_depart_ends_no_run(
     store: Workspace, project: Path
 ) -> None:
@@ -359,6 +362,7 @@ def test_whom_a_calibrator_removes_as_they_depart_ends_no_run(
     assert len(arrived) == len(alone.trips)
 
 
+@pytest.mark.slow
 def test_who_departs_before_the_simulation_begins_is_left_out_as_in_sumo(
     store: Workspace, project: Path
 ) -> None:
@@ -422,6 +426,7 @@ def test_exported_files_are_those_that_came(
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_a_closure_of_the_scenario_leads_vehicles_of_the_project_around(
     store: Workspace, scenario: Scenario
 ) -> None:
@@ -459,6 +464,7 @@ def test_of_a_network_in_pieces_the_largest_is_the_region(tmp_path: Path) -> Non
     assert "1 of 4 segments are not connected" in made.lists["approximated"][0].reason
 
 
+@pytest.mark.slow
 def test_files_that_are_sent_together_are_a_project(project: Path, tmp_path: Path) -> None:
     store = Workspace.open(tmp_path)
     names = ["run.sumocfg", "grid.net.xml", "sub/cars.rou.xml", "people.rou.xml", "things.add.xml"]
@@ -594,6 +600,7 @@ NETWORK_FAULTS: dict[str, tuple[str, str, str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", NETWORK_FAULTS)
 def test_twelve_wrong_networks_are_refused_with_file_and_reason(
     project: Path, tmp_path: Path, fault: str
@@ -705,6 +712,7 @@ def test_packed_included_and_drawn_traffic_runs_as_in_sumo(
     assert len(odd_alone.trips) > 150
 
 
+@pytest.mark.slow
 def test_no_passenger_is_lost_and_stops_loads_and_delays_are_those_of_sumo(
     odd_run: Run, odd_alone: Original, odd_project: Path
 ) -> None:

@@ -62,6 +62,7 @@ def test_templates_are_placed_where_there_is_room_and_else_say_why(
     assert placed == ROOM[map_name]
 
 
+@pytest.mark.slow
 def test_a_refusal_counts_the_places_and_the_reasons(workspace: Workspace) -> None:
     with pytest.raises(NoPlaceError, match=r"of \d+ places, \d+ are shorter than 143 m") as refused:
         template_scenario(workspace, "cut-in", "signal_crossing")

@@ -26,6 +26,7 @@ def flat(at: carla.Transform) -> list[float]:
     return [place.x, place.y, place.z, turn.pitch, turn.yaw, turn.roll]
 
 
+@pytest.mark.slow
 def test_a_spawned_vehicle_is_in_the_next_snapshot_where_it_was_put(connected: Connected) -> None:
     at = transform(12.25, -7.5, 0.3, pitch=2.0, yaw=-135.0, roll=1.0)
     car = connected.spawn(CAR, at)
@@ -39,6 +40,7 @@ def test_a_spawned_vehicle_is_in_the_next_snapshot_where_it_was_put(connected: C
     assert (2 * extent.x, 2 * extent.y, 2 * extent.z) == pytest.approx(body)
 
 
+@pytest.mark.slow
 def test_attributes_are_kept_as_they_were_chosen(connected: Connected) -> None:
     blueprint = connected.blueprint(CAR)
     blueprint.set_attribute("role_name", "hero 7")
@@ -49,6 +51,7 @@ def test_attributes_are_kept_as_they_were_chosen(connected: Connected) -> None:
     assert (peer.attributes["role_name"], peer.attributes["color"]) == ("hero 7", "1,2,3")
 
 
+@pytest.mark.slow
 def test_two_vehicles_cannot_be_spawned_into_each_other(connected: Connected) -> None:
     connected.spawn(CAR, transform(0.0, 0.0))
     with pytest.raises(RuntimeError, match="collision"):
@@ -57,6 +60,7 @@ def test_two_vehicles_cannot_be_spawned_into_each_other(connected: Connected) ->
     connected.spawn(CAR, transform(0.0, 4.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("blueprint", "z", "made"),
     [(CAR, 0.0, False), (CAR, 0.3, True), (WALKER, 0.93, False), (WALKER, 1.25, True)],
@@ -73,6 +77,7 @@ def test_what_touches_the_ground_is_not_made(
     assert bool(answer.error) is not made
 
 
+@pytest.mark.slow
 def test_a_destroyed_actor_is_gone_with_the_next_tick(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0))
     connected.world.tick()
@@ -82,6 +87,7 @@ def test_a_destroyed_actor_is_gone_with_the_next_tick(connected: Connected) -> N
     assert connected.client.apply_batch_sync([carla.command.DestroyActor(car.id)])[0].error
 
 
+@pytest.mark.slow
 def test_a_batch_spawns_moves_and_shows_all_in_one_tick(connected: Connected) -> None:
     places = [transform(10.0 * number, 3.0) for number in range(20)]
     command, new = carla.command, carla.command.FutureActor
@@ -100,6 +106,7 @@ def test_a_batch_spawns_moves_and_shows_all_in_one_tick(connected: Connected) ->
         assert seen.get_transform().location.x == pytest.approx(at.location.x + 3.0 * DELTA)
 
 
+@pytest.mark.slow
 def test_a_batch_goes_on_after_a_refusal(connected: Connected) -> None:
     blueprint = connected.blueprint(CAR)
     spawn = carla.command.SpawnActor
@@ -115,6 +122,7 @@ def test_a_batch_goes_on_after_a_refusal(connected: Connected) -> None:
     assert [bool(answer.error) for answer in answers] == [False, True, True, False]
 
 
+@pytest.mark.slow
 def test_without_physics_a_body_is_exactly_where_it_was_put_and_reports_no_velocity(
     connected: Connected,
 ) -> None:
@@ -138,6 +146,7 @@ def test_without_physics_a_body_is_exactly_where_it_was_put_and_reports_no_veloc
         assert seen.get_velocity() == seen.get_angular_velocity() == carla.Vector3D()
 
 
+@pytest.mark.slow
 def test_with_physics_a_body_moves_by_its_velocity(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(5.0, 5.0, yaw=90.0))
     car.enable_constant_velocity(carla.Vector3D(10.0, 0.0, 0.0))
@@ -150,6 +159,7 @@ def test_with_physics_a_body_moves_by_its_velocity(connected: Connected) -> None
     assert car.get_acceleration().y == pytest.approx(-10.0 / DELTA)
 
 
+@pytest.mark.slow
 def test_controls_and_lights_are_shown_as_they_were_set(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0))
     car.apply_control(carla.VehicleControl(throttle=0.5, steer=-0.25, brake=0.125, gear=3))
@@ -165,6 +175,7 @@ def test_controls_and_lights_are_shown_as_they_were_set(connected: Connected) ->
     assert connected.world.get_vehicles_light_states()[car.id] == other
 
 
+@pytest.mark.slow
 def test_wheels_are_turned_by_hand_only_without_physics(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0))
     left = carla.VehicleWheelLocation.FL_Wheel
@@ -180,6 +191,7 @@ def test_wheels_are_turned_by_hand_only_without_physics(connected: Connected) ->
     assert turned(6.0) == {"0": [6.0, -60.0]}
 
 
+@pytest.mark.slow
 def test_doors_open_where_a_model_has_some_and_an_open_one_does_not_go_with_its_vehicle(
     connected: Connected,
 ) -> None:
@@ -207,6 +219,7 @@ def test_doors_open_where_a_model_has_some_and_an_open_one_does_not_go_with_its_
     assert seen(bus) == ([], 1)
 
 
+@pytest.mark.slow
 def test_something_attached_goes_where_its_parent_goes(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0, yaw=90.0))
     camera = connected.spawn("sensor.camera.rgb", transform(2.0, 1.0, 1.5), attach_to=car)
@@ -216,6 +229,7 @@ def test_something_attached_goes_where_its_parent_goes(connected: Connected) -> 
     assert flat(camera.get_transform()) == pytest.approx([99.0, 52.0, 1.5, 0.0, 90.0, 0.0])
 
 
+@pytest.mark.slow
 def test_a_walker_walks_straight_on(connected: Connected) -> None:
     walker = connected.spawn(WALKER, transform(0.0, 0.0, 1.0))
     walker.apply_control(carla.WalkerControl(carla.Vector3D(0.0, 2.0, 0.0), 1.5))
@@ -226,6 +240,7 @@ def test_a_walker_walks_straight_on(connected: Connected) -> None:
     assert walker.get_control().speed == 1.5
 
 
+@pytest.mark.slow
 def test_a_walker_is_put_on_the_ground_and_the_server_adds_half_its_height(
     connected: Connected,
 ) -> None:
@@ -241,6 +256,7 @@ def test_a_walker_is_put_on_the_ground_and_the_server_adds_half_its_height(
     assert walker.get_velocity() == carla.Vector3D()
 
 
+@pytest.mark.slow
 def test_a_controller_of_walkers_starts_and_stops(connected: Connected) -> None:
     walker = connected.spawn(WALKER, transform(0.0, 0.0, 1.0))
     controller = connected.spawn("controller.ai.walker", carla.Transform(), attach_to=walker)
@@ -252,6 +268,7 @@ def test_a_controller_of_walkers_starts_and_stops(connected: Connected) -> None:
     assert controller.destroy()
 
 
+@pytest.mark.slow
 def test_a_car_is_no_walker(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0))
     batch = [carla.command.ApplyWalkerControl(car.id, carla.WalkerControl())]
@@ -277,6 +294,7 @@ def test_boxes_may_lie_before_and_beside_the_origin_of_their_vehicles() -> None:
         world.spawn_actor(blueprint, transform(last - 0.05, 20.0))
 
 
+@pytest.mark.slow
 def test_every_command_of_the_client_is_understood(connected: Connected) -> None:
     car = connected.spawn(CAR, transform(0.0, 0.0))
     walker = connected.spawn(WALKER, transform(0.0, 20.0, 1.0))

@@ -45,6 +45,7 @@ def test_a_picture_comes_with_every_tick(connected: Connected) -> None:
     assert images.empty()
 
 
+@pytest.mark.slow
 def test_what_stands_before_the_camera_is_in_the_upper_half(connected: Connected) -> None:
     sensor, images = camera(connected)
     assert sensor.is_listening()
@@ -58,6 +59,7 @@ def test_what_stands_before_the_camera_is_in_the_upper_half(connected: Connected
     assert columns.mean() == pytest.approx(WIDTH / 2, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_slow_camera_takes_fewer_pictures(connected: Connected) -> None:
     sensor, images = camera(connected, sensor_tick=0.2)
     assert sensor.is_listening()
@@ -67,6 +69,7 @@ def test_a_slow_camera_takes_fewer_pictures(connected: Connected) -> None:
     assert images.empty()
 
 
+@pytest.mark.slow
 def test_a_camera_that_stops_gets_no_more_pictures(connected: Connected) -> None:
     sensor, images = camera(connected)
     connected.world.tick()

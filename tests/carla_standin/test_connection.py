@@ -14,11 +14,13 @@ from tests.carla_standin.process import StandIn
 carla = pytest.importorskip("carla", reason="the real client asks the stand-in")
 
 
+@pytest.mark.slow
 def test_the_server_says_the_version_of_the_client(server: StandIn) -> None:
     client = connect(server)
     assert client.get_server_version() == client.get_client_version() == "0.9.16"
 
 
+@pytest.mark.slow
 def test_the_map_has_its_name_and_text(server: StandIn) -> None:
     road_map = connect(server).get_world().get_map()
     assert road_map.name == "Carla/Maps/Crossing"
@@ -42,6 +44,7 @@ def test_spawn_points_float_above_lanes_and_look_along_them(name: str) -> None:
             assert (turn + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_waypoints_of_the_client_lie_on_the_lane_graph(server: StandIn) -> None:
     road_map = connect(server).get_world().get_map()
     odr = parse((MAPS / "signal_crossing.xodr").read_bytes())
@@ -59,12 +62,14 @@ def test_the_blueprints_are_those_of_the_catalogue(server: StandIn) -> None:
     assert library.find("vehicle.mitsubishi.fusorosa").get_attribute("base_type") == "bus"
 
 
+@pytest.mark.slow
 def test_time_goes_on_without_a_client_that_ticks(server: StandIn) -> None:
     world = connect(server).get_world()
     first = world.wait_for_tick(2.0).frame
     assert world.wait_for_tick(2.0).frame > first
 
 
+@pytest.mark.slow
 def test_in_synchronous_mode_only_ticks_move_time(connected: Connected) -> None:
     world = connected.world
     before = world.get_snapshot()
@@ -79,6 +84,7 @@ def test_in_synchronous_mode_only_ticks_move_time(connected: Connected) -> None:
     assert stamp.elapsed_seconds - before.timestamp.elapsed_seconds == pytest.approx(DELTA)
 
 
+@pytest.mark.slow
 def test_on_tick_hears_of_every_frame(connected: Connected) -> None:
     frames: list[int] = []
     number = connected.world.on_tick(lambda snapshot: frames.append(snapshot.frame))
@@ -88,6 +94,7 @@ def test_on_tick_hears_of_every_frame(connected: Connected) -> None:
     assert [frame for frame in frames if frame >= expected[0]] == expected
 
 
+@pytest.mark.slow
 def test_settings_come_back_as_they_were_sent(connected: Connected) -> None:
     settings = connected.world.get_settings()
     assert (settings.synchronous_mode, settings.fixed_delta_seconds) == (True, DELTA)
@@ -102,6 +109,7 @@ def test_settings_come_back_as_they_were_sent(connected: Connected) -> None:
     assert connected.world.wait_for_tick(2.0).frame > first
 
 
+@pytest.mark.slow
 def test_weather_comes_back_with_all_its_parameters(connected: Connected) -> None:
     parameters = shipped_assets().preset("HardRainSunset").parameters
     connected.world.set_weather(carla.WeatherParameters(**parameters))
@@ -143,6 +151,7 @@ def test_a_map_that_somebody_else_loads_is_noticed() -> None:
         assert world.get_map().name == "Carla/Maps/Hills"
 
 
+@pytest.mark.slow
 def test_a_world_can_be_generated_from_opendrive_text(server: StandIn) -> None:
     text = (MAPS / "t_junction_signs.xodr").read_text(encoding="utf-8")
     world = connect(server).generate_opendrive_world(text)
@@ -151,6 +160,7 @@ def test_a_world_can_be_generated_from_opendrive_text(server: StandIn) -> None:
     assert sorted(set(signs)) == ["traffic.stop", "traffic.yield"]
 
 
+@pytest.mark.slow
 def test_a_reloaded_world_keeps_its_settings_if_asked_to(connected: Connected) -> None:
     world = connected.client.reload_world(reset_settings=False)
     assert world.id != connected.world.id

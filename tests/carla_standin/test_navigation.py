@@ -88,6 +88,7 @@ def test_the_clients_own_walkers_walk_on_sidewalks_and_cross_on_crosswalks(tmp_p
             assert feet == pytest.approx(ground[0], abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_mesh_covers_sidewalks_and_crosswalks_and_hangs_together() -> None:
     road_map = RoadMap.read(CROSSING, "Crossing")
     header, vertices, polygons = unpacked(navigation_mesh(road_map, 0.0))

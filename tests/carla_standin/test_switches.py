@@ -49,6 +49,7 @@ def test_a_frozen_server_answers_too_late(connected: Connected) -> None:
     assert connected.world.tick() == before + 2
 
 
+@pytest.mark.slow
 def test_a_dropped_stream_loses_its_tick_and_comes_back(connected: Connected) -> None:
     connected.server.set(drop_stream_at_tick=1)
     with pytest.raises(RuntimeError, match="time-out"):
@@ -57,6 +58,7 @@ def test_a_dropped_stream_loses_its_tick_and_comes_back(connected: Connected) ->
     assert connected.world.get_snapshot().frame == frame
 
 
+@pytest.mark.slow
 def test_a_stream_that_is_refused_stays_away(connected: Connected) -> None:
     connected.server.set(drop_stream_at_tick=1, refuse_streams=True)
     for _ in range(3):
@@ -64,6 +66,7 @@ def test_a_stream_that_is_refused_stays_away(connected: Connected) -> None:
             connected.world.tick(0.3)
 
 
+@pytest.mark.slow
 def test_a_server_dies_at_the_tick_it_was_told(connected: Connected) -> None:
     connected.client.set_timeout(0.5)
     connected.server.set(die_at_tick=3)
@@ -74,6 +77,7 @@ def test_a_server_dies_at_the_tick_it_was_told(connected: Connected) -> None:
     assert connected.server.has_died()
 
 
+@pytest.mark.slow
 def test_a_paused_server_goes_on_where_it_was(connected: Connected) -> None:
     connected.client.set_timeout(0.3)
     connected.server.pause()
@@ -84,11 +88,13 @@ def test_a_paused_server_goes_on_where_it_was(connected: Connected) -> None:
     connected.world.get_weather()
 
 
+@pytest.mark.slow
 def test_a_wrong_switch_is_refused(server: StandIn) -> None:
     with pytest.raises(RuntimeError, match="no such switch: explode"):
         server.set(explode=True)
 
 
+@pytest.mark.slow
 def test_calls_are_counted_by_name(connected: Connected) -> None:
     connected.server.reset_calls()
     connected.world.tick()
@@ -96,6 +102,7 @@ def test_calls_are_counted_by_name(connected: Connected) -> None:
     assert connected.server.calls() == {"tick_cue": 2, "apply_batch": 1}
 
 
+@pytest.mark.slow
 def test_the_server_knows_its_actors_as_the_client_does(connected: Connected) -> None:
     car = connected.spawn(CAR, place(2))
     connected.world.tick()

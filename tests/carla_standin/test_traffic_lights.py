@@ -25,6 +25,7 @@ def lights_of(world: Any) -> list[Any]:
     return list(world.get_actors().filter("traffic.traffic_light"))
 
 
+@pytest.mark.slow
 def test_every_light_of_the_map_is_found_by_its_opendrive_id(connected: Connected) -> None:
     odr = parse((MAPS / "signal_crossing.xodr").read_bytes())
     expected = {
@@ -64,6 +65,7 @@ def test_lights_stand_where_the_map_has_them_also_on_slopes() -> None:
     assert min(at.distance(place) for place in places) < 0.001
 
 
+@pytest.mark.slow
 def test_lights_of_a_junction_are_one_group_that_takes_turns(connected: Connected) -> None:
     lights = lights_of(connected.world)
     group = lights[0].get_group_traffic_lights()
@@ -93,6 +95,7 @@ def test_a_state_that_is_set_shows_with_the_next_tick(connected: Connected) -> N
         assert light.state == state
 
 
+@pytest.mark.slow
 def test_frozen_lights_keep_their_state_until_they_are_released(connected: Connected) -> None:
     lights = lights_of(connected.world)
     light = lights[0]
@@ -112,6 +115,7 @@ def test_frozen_lights_keep_their_state_until_they_are_released(connected: Conne
     assert not light.is_frozen()
 
 
+@pytest.mark.slow
 def test_a_group_can_begin_again(connected: Connected) -> None:
     lights = lights_of(connected.world)
     connected.world.tick()

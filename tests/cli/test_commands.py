@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from odscen.cli.commands import command_line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given", [["--help"], [], ["run", "--help"], ["maps", "pull", "--help"], ["rnu"]]
 )

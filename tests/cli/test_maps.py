@@ -25,6 +25,7 @@ STATISTICS = {
 }
 
 
+@pytest.mark.slow
 def test_show_gives_what_scripts_rely_on(workspace):
     done = odscen("maps", "show", "signal_crossing", "--json", "--workspace", workspace)
     info = done.json
@@ -52,6 +53,7 @@ def test_show_gives_what_scripts_rely_on(workspace):
     assert info["build_seconds"] > 0
 
 
+@pytest.mark.slow
 def test_all_files_of_a_map_are_there(workspace):
     files = odscen("maps", "show", "signal_crossing", "--json", "--workspace", workspace).json[
         "files"
@@ -120,6 +122,7 @@ def test_names_never_become_paths(tmp_path):
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.slow
 def test_an_unknown_map_is_answered_with_close_names(workspace):
     done = odscen("maps", "show", "signal_crosing", "--json", "--workspace", workspace)
     assert done.code == 2

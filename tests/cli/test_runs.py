@@ -124,6 +124,7 @@ def test_several_runs_have_their_records_and_the_rest_when_they_are_opened(
         assert summary["figures"]["vehicle_km"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_run_gives_what_scripts_rely_on(finished):
     assert list(finished)[2:4] == ["usable", "status"], "the verdict comes first"
     assert finished["usable"] == {"level": "usable", "headline": "usable", "reasons": []}

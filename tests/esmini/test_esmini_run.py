@@ -54,6 +54,7 @@ def parity_of(run: Run) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("stand_in")
 def test_what_esmini_shows_of_a_run_is_a_run_with_figures_and_parity(
     workspace: Workspace, sampled: Path, tmp_path: Path

@@ -150,6 +150,7 @@ def test_of_a_study_that_has_ended_or_was_interrupted(tmp_path: Path, most: int 
     )
 
 
+@pytest.mark.slow
 def test_of_a_dataset(tmp_path: Path) -> None:
     entry("signal_crossing")
     entry("t_junction_signs")
@@ -178,6 +179,7 @@ def test_what_a_run_of_a_dataset_was_exported_to_is_read_as_it_was_written(tmp_p
         make_dataset(place(), asked, tmp_path, MadeUpExports(), beside=tmp_path)
 
 
+@pytest.mark.slow
 def test_of_results_of_a_suite(tmp_path: Path) -> None:
     """They are written by one job and judged by another."""
     file = tmp_path / "results.json"

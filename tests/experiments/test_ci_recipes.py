@@ -129,6 +129,7 @@ def test_what_ci_calls_is_the_scripts_and_what_it_keeps_is_what_they_write(title
         assert any(own.startswith(path.rstrip("/")) for own in written), path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "count"), [("ci.sh", 8), ("merge.sh", 5)])
 def test_the_options_of_the_scripts_are_those_of_the_command(name, count):
     text = recipe(f"traffic/{name}").replace("\\\n", " ")

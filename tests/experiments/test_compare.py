@@ -104,6 +104,7 @@ def test_the_page_of_a_comparison_shows_chart_map_and_diagram(sides):
     assert all(f'class="dots side-{side}"' in diagram for side in "ab")
 
 
+@pytest.mark.slow
 def test_a_page_of_runs_that_are_the_same_says_so(sides):
     a, _ = sides
     page = comparison_page(compare_runs(read_runs(a), read_runs(a)))

@@ -276,6 +276,7 @@ def test_a_scenario_or_map_that_is_named_and_not_there_is_an_error_of_its_own(st
     assert "maps/t_junction_signs.xodr" in headline(case(result, "good"))
 
 
+@pytest.mark.slow
 def test_a_map_that_is_not_there_and_that_no_scenario_needs_refuses_the_suite(store, tiny):
     suite = tiny("good")
     suite.write_text(suite.read_text().replace("maps/*.xodr", "maps/typo.xodr"))
@@ -675,6 +676,7 @@ def test_parts_are_judged_together_as_if_they_had_run_here(store, in_parts, tmp_
     assert "2 of 3 scenarios do not pass" in page
 
 
+@pytest.mark.slow
 def test_a_part_that_is_not_there_is_the_error_of_its_scenarios(store, in_parts):
     suite, files = in_parts
     merged = run_suite(store, read_suite(suite), parts=read_parts(files[:2]))
@@ -682,6 +684,7 @@ def test_a_part_that_is_not_there_is_the_error_of_its_scenarios(store, in_parts)
     assert "none of the parts has run it" in headline(case(merged, "c"))
 
 
+@pytest.mark.slow
 def test_a_part_from_other_inputs_is_refused_for_what_has_changed(store, in_parts):
     suite, files = in_parts
     edit_scenario(suite, "c", environment={"preset": "WetNoon"})
@@ -691,6 +694,7 @@ def test_a_part_from_other_inputs_is_refused_for_what_has_changed(store, in_part
     assert words in headline(case(merged, "c"))
 
 
+@pytest.mark.slow
 def test_parts_that_do_not_fit_together_or_to_the_suite_are_refused(store, in_parts):
     suite, files = in_parts
     with pytest.raises(InputError, match=r"results\.json: b is in .*2/results\.json as well"):

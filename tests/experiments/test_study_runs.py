@@ -181,6 +181,7 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> EndedStudy:
     return carry_out_study(folder / "out", LocalExecutor(place(), 2), target=str(folder / "kept"))
 
 
+@pytest.mark.slow
 def test_each_run_is_a_row_and_one_that_is_not_possible_says_why(real: EndedStudy) -> None:
     assert real.table["status"].to_list() == ["completed", "completed", "refused", "refused"]
     assert real.table["per_minute"].to_list() == [4.0, 4.0, 30.0, 30.0]
@@ -190,6 +191,7 @@ def test_each_run_is_a_row_and_one_that_is_not_possible_says_why(real: EndedStud
     assert set(real.table.columns) >= {figure.name for figure in RUN_FIGURES}
 
 
+@pytest.mark.slow
 def test_a_row_has_the_figures_of_the_run_alone(real: EndedStudy, tmp_path: Path) -> None:
     file = plan_file(tmp_path).with_name("crossing.scenario.json")
     text = file.read_text("utf-8").replace('{"value": 3', '{"value": 4')

@@ -19,6 +19,7 @@ def section(page, heading):
     return next(part for part in page.split("<section")[1:] if heading in part)
 
 
+@pytest.mark.slow
 def test_the_worst_scenarios_stand_first(page):
     assert "4 of 4 scenarios do not pass" in page
     assert "1 error, 2 failed, 1 missing; 4 runs." in page

@@ -87,6 +87,7 @@ def test_each_case_is_a_row_with_its_outcome(swept: Sweep) -> None:
     assert swept.table.equals(pl.read_parquet(swept.folder / "cases.parquet"))
 
 
+@pytest.mark.slow
 def test_the_boundary_lies_between_safe_cases_and_others(swept: Sweep) -> None:
     assert swept.boundary
     for end in (point for stretch in swept.boundary for point in stretch):

@@ -79,6 +79,7 @@ def test_everybody_goes_where_their_body_was_at_each_recorded_time(folder: Path,
     assert timings == {"absolute"}
 
 
+@pytest.mark.slow
 def test_who_departs_later_is_added_then_and_who_leaves_is_deleted(tree: Any) -> None:
     added = {one.getparent().get("entityRef") for one in tree.iterfind(".//AddEntityAction")}
     placed = {one.get("entityRef") for one in tree.iterfind(".//Private")}

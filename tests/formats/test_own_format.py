@@ -54,6 +54,7 @@ def test_the_example_of_a_format_runs() -> None:
     assert doctest.testmod(odscen.formats.base).failed == 0
 
 
+@pytest.mark.slow
 def test_it_is_written_and_read_in_python(
     package: Path, workspace: odscen.Workspace, sampled: Path, tmp_path: Path
 ) -> None:

@@ -310,6 +310,7 @@ def listed(notes: dict[str, Any]) -> Iterator[str]:
         yield from (row["reason"] for row in rows)
 
 
+@pytest.mark.slow
 def test_what_scenario_runner_refuses_is_listed(folder: Path) -> None:
     _, notes = exported("every rule", folder)
     left = [row["reason"] for row in notes["left_out"]]

@@ -82,6 +82,7 @@ def test_semantics_say_what_is_where():
     assert (limit["x"], limit["y"], limit["z"]) == (40.0, -5.0, 2.0)
 
 
+@pytest.mark.slow
 def test_real_town_figures(shared_maps):
     text = (shared_maps / "carla-2020" / "Town04.xodr").read_bytes()
     statistics = map_statistics(*model(text))

@@ -104,6 +104,7 @@ def test_ids_stay_distinct_when_a_road_is_called_like_a_segment_of_a_chain() -> 
     assert build_segments(odr).segments.ids == ("r1-0", "r1-1", "r1-0_")
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.lists(st.floats(1.0, 400.0), min_size=1, max_size=6), st.booleans())
 def test_segments_are_equal_and_cover_all_roads_once(lengths: list[float], ring: bool) -> None:

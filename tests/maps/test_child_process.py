@@ -121,6 +121,7 @@ def test_a_child_that_is_killed_is_an_error_that_says_so(store: Workspace, scrat
     assert store.add_map(SMALL).name == "t_junction_signs"
 
 
+@pytest.mark.slow
 def test_what_the_progress_function_raises_ends_the_child_and_leaves_nothing(
     store: Workspace, scratch: Path, motorway: Path
 ) -> None:
@@ -242,6 +243,7 @@ def test_a_scenario_made_to_hurt_is_refused_with_its_name(content: bytes, words:
     assert str(caught.value).startswith("bad.json: ")
 
 
+@pytest.mark.slow
 @linux
 def test_a_scenario_of_millions_of_faults_ends_the_child_only(scratch: Path) -> None:
     with pytest.raises(

@@ -65,6 +65,7 @@ def test_sampled_scenarios_run_to_their_end_on_netconverts_network(
     assert counts["collided"] <= 2
 
 
+@pytest.mark.slow
 def test_lights_by_netconvert_are_named_by_their_junctions(workspace: Workspace) -> None:
     (light,) = workspace.map("signal_crossing").info["lights"]
     assert light["junctions"] == ["10001"]
@@ -104,6 +105,7 @@ def test_a_map_without_a_mention_of_a_converter_is_odscens(tmp_path: Path) -> No
     assert Workspace.open(tmp_path).map("signal_crossing").converter == "odscen"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("converter", "expected"), [("netconvert", ToolError), ("file", InputError)]
 )

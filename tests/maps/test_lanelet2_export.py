@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+@pytest.mark.slow
 def test_a_map_goes_out_and_comes_in_again_with_the_same_borders_and_relations() -> None:
     first = model_of(imported(bytes(fork_file()[0])))
     out = export_lanelet2(first)

@@ -76,6 +76,7 @@ def fake(folder: Path, script: str) -> Path:
     return program
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("script", "problem"),
     [

@@ -270,6 +270,7 @@ def test_lane_changes_between_lanes_of_one_direction_are_marked(name):
                 assert set(marks) <= allowed
 
 
+@pytest.mark.slow
 @every_crossing
 def test_crosswalks_lead_from_sidewalk_to_sidewalk_behind_stop_lines(name):
     here = shipped(name)

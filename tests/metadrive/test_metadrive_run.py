@@ -122,6 +122,7 @@ def test_who_is_not_shown_is_in_the_parity_report(
     assert absent["since"] == 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("stand_in")
 def test_a_process_that_ends_is_a_failed_run_with_its_words(
     workspace: Workspace,

@@ -69,6 +69,7 @@ def test_every_element_that_is_read_is_written() -> None:
     assert len(leaves(again)) > 300
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", shipped_maps(), ids=lambda path: path.stem)
 def test_shipped_maps_are_the_same_after_writing(path: Path) -> None:
     """Same model; and what is written, read and written again has the same bytes."""

@@ -59,6 +59,7 @@ def test_a_run_that_is_opened_ends_with_the_bytes_of_one_that_was_measured_at_on
     assert waiting.summary == summaries[0], "one that was held meanwhile reads what is there"
 
 
+@pytest.mark.slow
 def test_figures_of_actors_do_not_have_all_others_computed(waiting: Run) -> None:
     figure = run_figure("mean_travel_time")
     assert figure is not None
@@ -85,6 +86,7 @@ def test_nothing_is_computed_from_damaged_records(waiting: Run) -> None:
     assert not (waiting.folder / layout.FIGURES_FILE).exists()
 
 
+@pytest.mark.slow
 def test_what_is_expected_of_a_run_is_held_against_figures_at_once(
     prepared: SumoPreparedRun, tmp_path: Path
 ) -> None:

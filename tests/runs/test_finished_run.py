@@ -32,6 +32,7 @@ def finished(workspace: Workspace) -> Run:
     return run(workspace, SCENARIO, settings=settings)
 
 
+@pytest.mark.slow
 def test_a_run_that_is_opened_again_is_the_same(finished: Run) -> None:
     again = Run.open(finished.folder)
     assert again.summary == json.loads(json.dumps(finished.summary))
@@ -106,6 +107,7 @@ def test_lanes_of_trajectories_lie_in_places(finished: Run) -> None:
     assert joined["junction"].unique().to_list() == ["j10001"]
 
 
+@pytest.mark.slow
 def test_what_is_not_there_is_named(finished: Run, workspace: Workspace, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no finished run here"):
         Run.open(tmp_path)

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,12 @@ from odscen.web.security import LOOPBACK
 
 SHIPPED = Path(__file__).parents[2] / "maps"
 CROSSING = "signal_crossing"
+
+
+@cache
+def openapi_schema() -> dict[str, Any]:
+    """What the server says of itself; it takes seconds, and whoever collects tests asks twice."""
+    return create_app(Workspace(Path("nowhere"))).openapi()
 
 
 @pytest.fixture(scope="session")

@@ -96,6 +96,7 @@ def test_a_changed_byte_of_a_picture_is_noticed(
     assert client.delete(URL).status_code == 204
 
 
+@pytest.mark.slow
 def test_a_mended_copy_has_the_picture_too(workspace: Workspace) -> None:
     points = [PicturePoint(0, 0, -50, 25), PicturePoint(200, 0, 50, 25)]
     before = workspace.set_background("signal_crossing", picture(), points=points)

@@ -37,6 +37,7 @@ def rules_of_one_actor(workspace: Workspace, name: str, number: int) -> bytes:
     return json.dumps(document | {"rules": rules}).encode()
 
 
+@pytest.mark.slow
 def test_an_upload_of_many_rules_of_one_actor_is_answered_in_proportion(
     client: TestClient, workspace: Workspace, sampled: str
 ) -> None:
@@ -101,6 +102,7 @@ def test_health_is_answered_while_a_scenario_is_checked(
     assert statuses == [200]
 
 
+@pytest.mark.slow
 def test_edits_of_one_request_have_so_much_time_and_are_made_all_or_none(
     client: TestClient, sampled: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -121,6 +123,7 @@ def test_edits_of_one_request_have_so_much_time_and_are_made_all_or_none(
     assert len(answer.json()["document"]["measures"]) == 400
 
 
+@pytest.mark.slow
 def test_each_command_and_route_has_its_limits_in_the_document(client: TestClient) -> None:
     table = LIMITS.read_text("utf-8").partition("## Commands and routes")[2]
     rows = [line.split("|")[1:4] for line in table.splitlines() if line.startswith("| `")]

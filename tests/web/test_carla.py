@@ -41,6 +41,7 @@ def left(server: StandIn) -> list[str]:
     return [a["type_id"] for a in server.actors() if a["type_id"].startswith(kinds)]
 
 
+@pytest.mark.slow
 def test_the_page_learns_that_a_server_is_there(page: TestClient, standin: StandIn) -> None:
     info = page.get("/api/carla").json()
     assert info["state"] == "connected"

@@ -82,6 +82,7 @@ def test_the_load_bench_measures_every_kind_of_load() -> None:
     assert all(row.asked for row in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sums", [True, False])
 def test_damaged_records_of_lights_are_named_by_the_page(
     client: TestClient, workspace: Workspace, sampled: str, sums: bool

@@ -83,6 +83,7 @@ def own_program(workspace: Workspace) -> Scenario:
     return scenario(one_plan()).model_copy(update={"map": reference})
 
 
+@pytest.mark.slow
 def test_no_id_breaks_an_edit_of_any_kind(workspace: Workspace) -> None:
     loaded, before = load_map(workspace.map(CROSSING)), own_program(workspace)
     refused = made = 0

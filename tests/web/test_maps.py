@@ -93,6 +93,7 @@ def test_a_map_tells_its_lights_as_the_live_view_names_them(client: TestClient) 
     assert [name for names in light["signals"] for name in names]
 
 
+@pytest.mark.slow
 def test_heights_are_those_of_the_nodes_and_none_of_a_flat_map(
     client: TestClient, workspace: Workspace
 ) -> None:

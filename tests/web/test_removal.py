@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from starlette.testclient import TestClient
 
 from odscen.maps.store import Workspace
@@ -25,6 +26,7 @@ def test_what_is_removed_can_be_undone_with_its_history(client: TestClient, samp
     assert client.post(f"/api/trash/{removed['id']}/restore").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_map_under_a_live_run_is_removed_with_the_facts_and_the_run_ends_well(
     client: TestClient, sampled: str
 ) -> None:

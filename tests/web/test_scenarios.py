@@ -285,6 +285,7 @@ def test_a_region_is_filled_by_an_installed_generator_and_its_options(
     assert len(found["spread", 12]) > 2 * len(found["spread", 60])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("generator", "options", "status", "said"),
     [
@@ -325,6 +326,7 @@ def test_a_stale_version_is_refused_and_told_the_newest(client: TestClient, new:
     assert client.get(f"/api/scenarios/{new}").json()["document"]["seed"] == 3
 
 
+@pytest.mark.slow
 def test_edits_in_one_request_are_all_made_or_none_and_one_step(
     client: TestClient, new: str
 ) -> None:

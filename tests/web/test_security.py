@@ -226,6 +226,7 @@ def test_an_entity_bomb_as_scenario_is_refused(client: TestClient) -> None:
         assert answer.json()["error"]["kind"] == "ScenarioError"
 
 
+@pytest.mark.slow
 def test_the_list_of_the_interface_runs_no_script_and_loads_nothing(client: TestClient) -> None:
     page = client.get("/api/docs")
     assert page.status_code == 200

@@ -47,6 +47,7 @@ def test_a_page_cannot_choose_what_program_the_server_starts(
         assert "where this server is started" in refused.text
 
 
+@pytest.mark.slow
 def test_a_run_of_the_page_is_played_by_the_simulator_that_is_chosen(
     client: TestClient, workspace: Workspace, sampled: str, steady: str
 ) -> None:

@@ -20,7 +20,6 @@ from odscen.lanegraph.map_statistics import MapStatistics
 from odscen.maps.store import Workspace
 from odscen.records.run_events import Event, EventKind, event_row
 from odscen.runs import layout
-from odscen.web.application import create_app
 from odscen.web.wire.live_messages import LiveMessage
 from odscen.web.wire.map_messages import (
     ConversionInfo,
@@ -32,9 +31,8 @@ from odscen.web.wire.map_messages import (
 from odscen.web.wire.run_messages import IncidentInfo, ReplayColumns
 from odscen.web.wire.summary_messages import RunSummary, SummaryCounts
 from tests.cli.conftest import odscen
-from tests.web.conftest import CROSSING, finished
+from tests.web.conftest import CROSSING, finished, openapi_schema
 
-SCHEMA = create_app(Workspace(Path("nowhere"))).openapi()
 NAMES_ONLY = {"properties", "patternProperties", "schemas"}
 """Their keys are names and not words of JSON Schema."""
 WORDS = {"default", "example", "examples", "enum", "const", "required", "discriminator"}
@@ -71,7 +69,7 @@ def untyped(schema: dict[str, Any]) -> bool:
 def test_no_message_has_an_untyped_part() -> None:
     found = [
         place
-        for name, component in SCHEMA["components"]["schemas"].items()
+        for name, component in openapi_schema()["components"]["schemas"].items()
         for place, schema in schemas(component, name)
         if untyped(schema)
     ]
@@ -80,8 +78,8 @@ def test_no_message_has_an_untyped_part() -> None:
 
 def test_every_answer_and_argument_has_a_schema() -> None:
     found = []
-    errors = {"#/components/responses/Error": SCHEMA["components"]["responses"]["Error"]}
-    for path, methods in SCHEMA["paths"].items():
+    errors = {"#/components/responses/Error": openapi_schema()["components"]["responses"]["Error"]}
+    for path, methods in openapi_schema()["paths"].items():
         for method, operation in methods.items():
             where = f"{method} {path}"
             contents = {
@@ -207,10 +205,10 @@ def test_an_incident_is_sent_as_it_stands_in_the_file_of_events() -> None:
 
 @pytest.mark.parametrize("kind", ["hello", "state", "lights", "detectors", "events", "end"])
 def test_the_schema_has_the_texts_of_the_live_view(kind: str) -> None:
-    told = SCHEMA["components"]["schemas"]["LiveMessage"]
+    told = openapi_schema()["components"]["schemas"]["LiveMessage"]
     assert (
         told["discriminator"]["mapping"][kind].removeprefix("#/components/schemas/")
-        in (SCHEMA["components"]["schemas"])
+        in (openapi_schema()["components"]["schemas"])
     )
 
 

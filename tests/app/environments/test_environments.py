@@ -46,6 +46,7 @@ def test_the_ego_passes_the_check_of_gymnasium() -> None:
     env.close()
 
 
+@pytest.mark.slow
 def test_the_ego_brakes_as_it_is_told_and_the_episode_ends_with_the_run() -> None:
     env = EgoEnvironment(workspace(), scene(until=1.0))
     seen, _ = env.reset(seed=1)

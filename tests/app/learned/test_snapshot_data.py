@@ -52,6 +52,7 @@ def shards(workspace: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return folder
 
 
+@pytest.mark.slow
 def test_lights_show_what_their_program_says_at_each_second(workspace: Workspace) -> None:
     sumo = load_map(workspace.map(CROSSING)).sumo
     start = lights_at_start(sumo)

@@ -38,6 +38,7 @@ USED = {
 """Files of a run, and whether a comparison reads them."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", USED)
 def test_a_report_or_a_comparison_of_a_damaged_run_names_the_run_and_the_file(
     workspace: Workspace, finished: Path, tmp_path: Path, name: str

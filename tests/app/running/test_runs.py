@@ -59,6 +59,7 @@ def test_a_run_that_has_ended_is_replaced_only_where_that_is_said(
     assert (again.folder, again.known["seed"]) == (first.folder, 9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overwrite", [True, False])
 def test_a_folder_that_is_no_run_is_never_replaced(
     workspace: Workspace, sampled: Path, tmp_path: Path, overwrite: bool
@@ -73,6 +74,7 @@ def test_a_folder_that_is_no_run_is_never_replaced(
     run(workspace, sampled, settings=SHORT, out=tmp_path, name="empty", overwrite=overwrite)
 
 
+@pytest.mark.slow
 def test_settings_reach_plan_and_summary_unchanged(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:
@@ -90,6 +92,7 @@ def test_settings_reach_plan_and_summary_unchanged(
     assert result.exit_code == 1
 
 
+@pytest.mark.slow
 def test_files_can_be_added_when_the_simulation_has_ended_and_before_the_report(
     workspace: Workspace, sampled: Path, tmp_path: Path
 ) -> None:

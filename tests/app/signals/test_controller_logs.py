@@ -112,6 +112,7 @@ def test_a_light_is_green_when_the_log_says(store: Workspace, tmp_path: Path) ->
             assert abs(b - d) <= 0.5
 
 
+@pytest.mark.slow
 def test_a_run_begins_in_the_log_where_one_says(store: Workspace, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(made_log(600.0))
 

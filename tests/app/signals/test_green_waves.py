@@ -65,6 +65,7 @@ def test_lights_of_a_road_get_one_cycle_and_offsets_with_the_bands_that_are_repo
     assert waves[-1].out_time == pytest.approx(waves[0].back_time, rel=0.2)
 
 
+@pytest.mark.slow
 def test_one_direction_gets_all_of_its_shortest_green(workspace: Workspace, town: Scenario) -> None:
     found = coordinate_signals(workspace, town, junctions=AVENUE, favoured="out")
     shortest = min(max(w.seconds for w in one.wave.out) for one in found.lights)
@@ -94,6 +95,7 @@ def test_two_narrow_bands_give_way_to_a_wide_one_and_none_is_said_to_be_none() -
     assert none.to_words()[-1].startswith("There is no green wave: neither direction")
 
 
+@pytest.mark.slow
 def test_lights_with_bus_priority_keep_it_in_a_green_wave(
     workspace: Workspace, town: Scenario
 ) -> None:

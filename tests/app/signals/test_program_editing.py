@@ -39,6 +39,7 @@ def spans(workspace: Workspace, one: Scenario) -> tuple[StageSpan, ...]:
     return stage_spans(light.plans[0])
 
 
+@pytest.mark.slow
 def test_a_program_that_is_taken_over_has_the_maps_stages_times_and_bounds(
     workspace: Workspace,
 ) -> None:

@@ -37,6 +37,7 @@ def placed(workspace: Workspace, one: Scenario, name: str = "signal_crossing") -
     return one.model_copy(update={"map": MapReference(name=name, sha256=sha256)})
 
 
+@pytest.mark.slow
 def test_volumes_are_those_of_the_vehicles_of_a_run(workspace: Workspace) -> None:
     one = placed(workspace, scenario(None, vehicles=360.0))
     planned = realize(one, crossing().sumo).plan.actors

@@ -400,6 +400,7 @@ def test_lights_by_netconvert_show_movements_by_segments(by_netconvert: Workspac
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_conflicting_greens_are_refused_on_a_network_by_netconvert_with_both_movements(
     by_netconvert: Workspace, tmp_path: Path
 ) -> None:

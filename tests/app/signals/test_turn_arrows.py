@@ -63,6 +63,7 @@ def timing(one: Scenario) -> JunctionTiming:
     return found
 
 
+@pytest.mark.slow
 def test_turns_get_an_arrow_where_the_product_of_volumes_asks_for_it(workspace: Workspace) -> None:
     one = main_road(workspace, 700.0, 200.0)
     new, arrows = with_turn_arrows(workspace, one)

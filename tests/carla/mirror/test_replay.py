@@ -65,6 +65,7 @@ def recorded(
     return path, transcript, folder, told
 
 
+@pytest.mark.slow
 def test_the_transcript_has_calls_their_answers_and_the_states_of_the_world(
     recorded: tuple[Path, Path, Path, dict[str, Any]],
 ) -> None:

@@ -106,6 +106,7 @@ def test_what_carla_alone_does_not_do_of_actors_measures_and_parking_is_said(
     ]
 
 
+@pytest.mark.slow
 def test_a_path_has_one_point_for_each_junction_outside_of_any(
     planned: Any, sample: Sample
 ) -> None:

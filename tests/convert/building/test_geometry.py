@@ -68,6 +68,7 @@ class Tried:
         return np.array(same, dtype=bool), np.abs(back.s - self.s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inside", [False, True], ids=["roads", "junctions"])
 @each_map()
 def test_places_of_the_table_lie_on_the_lanes_of_the_map(path: Path, inside: bool) -> None:

@@ -57,6 +57,7 @@ def test_a_map_of_absurd_length_is_sampled_less_densely(monkeypatch: pytest.Monk
 points = st.tuples(*[st.floats(-50, 50)] * 3)
 
 
+@pytest.mark.slow
 @given(st.lists(st.lists(points, min_size=1, max_size=6), min_size=1, max_size=5))
 def test_samples_of_shapes_lie_on_them_and_hold_both_ends(
     shapes: list[list[tuple[float, ...]]],

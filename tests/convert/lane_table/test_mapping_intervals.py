@@ -80,6 +80,7 @@ def test_answering_spans_are_disjoint_and_lie_on_their_pieces(
         assert listed[span.interval].lane == span.lane
 
 
+@pytest.mark.slow
 @given(st.lists(intervals(), max_size=12))
 def test_answering_spans_leave_out_nothing_but_slivers(listed: list[MappingInterval]) -> None:
     spans = answering(listed, least=1e-6)

@@ -259,6 +259,7 @@ def test_on_no_map_have_two_that_meet_green_together_unless_one_gives_way(path: 
     assert unsafe_pairs(net) == ()
 
 
+@pytest.mark.slow
 @each_map()
 def test_on_no_map_has_traffic_from_across_green_together(path: Path) -> None:
     """Giving way does not make it right: a crossing road, or a crossing before the turn, waits."""

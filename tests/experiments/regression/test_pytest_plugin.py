@@ -48,6 +48,7 @@ def test_pytest_finds_the_plugin_by_its_entry_point():
     assert callable(module.pytest_collect_file)
 
 
+@pytest.mark.slow
 def test_scenario_files_are_left_alone_unless_asked_for(project, workspace):
     (project / "test_other.py").write_text(
         "import sys\n\ndef test_nothing_is_loaded():\n"

@@ -79,6 +79,7 @@ def crossing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_scenes_are_those_that_were_made_and_no_others(crossing: Path, entry: MapEntry) -> None:
     shown = show_recording(odscen.read_recorded_traffic(crossing), entry)
     found = {row["kind"]: row for row in shown.scenes.to_dicts()}

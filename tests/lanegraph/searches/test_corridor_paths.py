@@ -39,6 +39,7 @@ def between_lines(matrix: csr_matrix, length: int) -> np.ndarray:
     return edges.row // length != edges.col // length
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 10**6), st.booleans())
 def test_a_path_is_the_one_that_a_search_of_all_nodes_finds(seed: int, metres: bool) -> None:

@@ -74,6 +74,7 @@ def test_features_are_of_each_stage() -> None:
     assert by_name["seconds of the change"] == pytest.approx([0.4, 0.0, 0.5])
 
 
+@pytest.mark.slow
 def test_a_policy_learns_to_serve_the_fullest_approach() -> None:
     rng = np.random.default_rng(1)
     learner = PpoLearner(rng, updates=12)

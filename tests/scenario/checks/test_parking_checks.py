@@ -33,6 +33,7 @@ def test_trips_that_park_on_a_map_with_places_are_in_order() -> None:
     assert codes(parking_scenario({"begin": 0.2, "end": 0.5})) == []
 
 
+@pytest.mark.slow
 def test_a_map_without_places_is_named() -> None:
     assert codes(parking_scenario({"end": 0.5}), parking=NO_PARKING) == ["no_parking"]
     assert codes(parking_scenario({}), parking=NO_PARKING) == []

@@ -57,6 +57,7 @@ def test_the_busiest_way_goes_through_several_junctions_that_follow_each_other(r
     assert apart > 0.8 * corridor.length
 
 
+@pytest.mark.slow
 def test_a_corridor_is_where_most_drive_and_does_not_turn_off_with_the_crowd(run: Path) -> None:
     graph = built(NAME).sumo.graph
     corridor = busiest_corridor(movements(run), graph)
@@ -80,6 +81,7 @@ def test_a_corridor_is_where_most_drive_and_does_not_turn_off_with_the_crowd(run
     assert chosen.segments == along
 
 
+@pytest.mark.slow
 def test_vehicles_advance_along_a_corridor_as_fast_as_they_drive(run: Path) -> None:
     where = built(NAME).sumo
     corridor = busiest_corridor(movements(run), where.graph)

@@ -130,6 +130,7 @@ def test_each_segment_has_what_was_driven_in_it(run: Run) -> None:
         assert row["standing_seconds"] == pytest.approx(row["stopped"], rel=CLOSE, abs=1.0), name
 
 
+@pytest.mark.slow
 def test_the_road_before_the_queue_is_free_and_in_the_queue_it_has_level_f(run: Run) -> None:
     figures = of_segments(run)
     stopped = (
@@ -157,6 +158,7 @@ def test_the_road_before_the_queue_is_free_and_in_the_queue_it_has_level_f(run: 
     assert beyond["seconds"].max() < 5.0, "nobody gets past"
 
 
+@pytest.mark.slow
 def test_parts_of_a_lane_add_up_to_what_sumo_measures_on_it(run: Run, unrecorded: Run) -> None:
     for one in (run, unrecorded):
         lanes = pl.read_parquet(one.folder / "lanes.parquet").filter(col("edge") == "1.0.f")
@@ -206,6 +208,7 @@ def test_figures_of_whole_lanes_say_so_where_nothing_else_is_known(run: Run) -> 
     assert over_run(of_segments(run).drop("cell"))["spread"].to_list() == [0.0] * 30
 
 
+@pytest.mark.slow
 def test_of_a_region_only_its_segments_have_figures_of_their_own(tmp_path: Path) -> None:
     region = Recording(region=(-10.0, -50.0, 1000.0, 50.0))
     found = straight(tmp_path, recording=region).figures_by("segment")

@@ -212,6 +212,7 @@ def test_delay_and_travel_time_are_those_of_tripinfo(run):
     assert run.trips["time_loss"].mean() > 10.0, "else there is nothing to be measured"
 
 
+@pytest.mark.slow
 def test_time_lost_on_all_stretches_is_that_of_tripinfo_for_each_vehicle(run):
     parts = ("behind", "on_the_way", "before", "inside")
     ours = run.stretches.group_by("id").agg(pl.sum_horizontal(parts).sum().alias("ours"))

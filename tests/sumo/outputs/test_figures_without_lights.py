@@ -144,6 +144,7 @@ def entered(run: Run, movement: str) -> float:
     return number * 6.0
 
 
+@pytest.mark.slow
 def test_a_stop_sign_carries_what_hcm_computes_from_the_flows_that_were_driven(run):
     """HCM chapter 20 for movements 4, 7 and 9, written out, with what induction loops count."""
 

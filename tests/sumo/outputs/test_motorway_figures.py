@@ -193,6 +193,7 @@ def test_a_motorway_with_an_incident_is_free_before_the_queue_and_has_level_f_in
     assert stopped.height >= 3
 
 
+@pytest.mark.slow
 def test_places_along_curved_lanes_are_found_from_x_and_y(motorway: Motorway) -> None:
     run, facts = motorway.run, read_net_facts(motorway.run.folder)
     lanes = read_lanes(run.folder)

@@ -53,6 +53,7 @@ def of_stem(run: Run, place: str, *, over_time: bool = False) -> pl.DataFrame:
     return table.filter(col("lane_group").str.contains("r3>"))
 
 
+@pytest.mark.slow
 def test_demand_and_vc_are_of_all_who_wanted_to_come(run: Run) -> None:
     actors = run.summary["actors"]
     assert actors["waiting"] > 20, "a lane that takes all shows nothing"

@@ -70,6 +70,7 @@ def cars(table: pl.DataFrame) -> pl.DataFrame:
     return table.filter(col("id").str.starts_with("car"))
 
 
+@pytest.mark.slow
 def test_everybody_who_set_out_has_one_trip_across_all_slices(
     folder: Path, trips: pl.DataFrame
 ) -> None:

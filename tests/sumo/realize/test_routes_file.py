@@ -234,6 +234,7 @@ def test_a_place_that_no_way_passes_is_the_reason_for_its_count() -> None:
     assert row.why == "no route inside the region passes here"
 
 
+@pytest.mark.slow
 def test_a_run_is_counted_as_it_was_planned_where_traffic_is_light(tmp_path: Path) -> None:
     graph = built(CROSSING).sumo.graph
     known, rows = surveyed(CROSSING, trips=150)

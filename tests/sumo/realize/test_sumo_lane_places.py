@@ -43,6 +43,7 @@ def test_every_lane_for_vehicles_has_one_place_on_shipped_maps(name):
     assert set(kinds) == {*places.segments["segment"], *places.junctions["junction"]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHIPPED)
 def test_movements_are_those_of_the_lane_graph(name):
     sumo_map = built(name).sumo

@@ -121,6 +121,7 @@ def test_a_right_angle_of_10_m_is_driven_as_people_do(tmp_path):
     assert done.motion().is_empty()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pieces", "grade", "slowest"), [(S_CURVE, 0.0, (38.0, 46.0)), (MOUNTAIN, 0.08, (19.0, 26.0))]
 )

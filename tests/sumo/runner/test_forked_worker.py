@@ -72,6 +72,7 @@ def test_results_that_are_left_to_us_are_those_that_the_process_makes(
     assert {name: (folder / name).read_bytes() for name in RECORDS} == fresh
 
 
+@pytest.mark.slow
 def test_records_that_results_cannot_be_made_of_fail_their_run(
     prepare: Prepare, tmp_path: Path
 ) -> None:

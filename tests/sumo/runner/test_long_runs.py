@@ -511,6 +511,7 @@ def test_whatever_of_its_start_is_changed_deleted_or_added_an_interrupted_run_is
     assert resume(run).status == "completed"
 
 
+@pytest.mark.slow
 def test_a_run_that_a_socket_drives_is_named_again_by_its_socket(
     long: SumoPreparedRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,6 +39,7 @@ def scenario(loaded: LoadedMap, *spawns: int) -> Scenario:
     )
 
 
+@pytest.mark.slow
 def test_every_node_with_a_lane_aside_is_warned_of_with_its_distance(loaded: LoadedMap) -> None:
     aside = loaded.sumo.lane_places.deviation
     chosen = np.argsort(-aside)[:5].tolist()

@@ -122,6 +122,7 @@ def test_in_long_steps_plain_sumo_gives_the_same_trajectories(tmp_path: Path) ->
     assert (sumo / "trajectories.parquet").read_bytes() == ours
 
 
+@pytest.mark.slow
 def test_sumo_loads_the_files_without_a_word(tmp_path: Path) -> None:
     name = "roundabout"
     prepared = prepare(sampled(name), built(name).sumo, net_file(name, tmp_path))
@@ -165,6 +166,7 @@ def test_recorded_speeds_stay_below_what_each_actor_wants(tmp_path: Path) -> Non
             assert fastest[actor.id] <= actor.speed + 0.06, actor.id
 
 
+@pytest.mark.slow
 def test_a_flow_drives_and_walks(tmp_path: Path) -> None:
     name = "signal_crossing"
     where = built(name).sumo
@@ -185,6 +187,7 @@ def test_a_flow_drives_and_walks(tmp_path: Path) -> None:
     assert max(o.insertion_error or 0.0 for o in outcomes) < 0.15
 
 
+@pytest.mark.slow
 def test_a_hand_placed_spawn_inside_a_junction_is_kept(tmp_path: Path) -> None:
     name = "signal_crossing"
     where = built(name).sumo

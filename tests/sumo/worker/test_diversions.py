@@ -139,6 +139,7 @@ def test_a_closure_between_two_steps_ends_as_well(
     assert run.summary["actors"]["stranded"] == 0
 
 
+@pytest.mark.slow
 def test_who_is_bound_for_a_closed_road_is_stranded_and_counted(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:
@@ -267,6 +268,7 @@ def test_a_sliced_run_that_is_killed_while_measures_act_ends_with_the_same_bytes
     assert states.height > 0
 
 
+@pytest.mark.slow
 def test_the_vehicle_of_an_incident_stops_where_and_when_it_is_to(
     workspace: Workspace, town: LoadedMap, tmp_path: Path
 ) -> None:

@@ -61,6 +61,7 @@ def drive(
         return events, session.time, arrived
 
 
+@pytest.mark.slow
 def test_who_is_in_the_lane_beside_at_the_stop_line_goes_round_and_arrives(
     net: Path, tmp_path: Path
 ) -> None:

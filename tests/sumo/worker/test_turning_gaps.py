@@ -82,6 +82,7 @@ def turns_between(
     return order == ["a", "turns", "b"]
 
 
+@pytest.mark.slow
 def test_a_gap_is_taken_from_some_six_seconds_on(net: Path, tmp_path: Path) -> None:
     """SUMO alone lets nobody in below 12 s here, as paths cross 27 m behind the stop line."""
     taken = {gap: turns_between(net, tmp_path, gap) for gap in (3.0, 4.5, 7.0, 9.0)}
@@ -92,6 +93,7 @@ def test_a_gap_is_taken_from_some_six_seconds_on(net: Path, tmp_path: Path) -> N
     assert not turns_between(net, tmp_path, 7.0, moved=("turns",))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["0.5", "1"])
 def test_no_two_touch_whatever_the_gap(net: Path, tmp_path: Path, step: str) -> None:
     for gap in range(2, 14):

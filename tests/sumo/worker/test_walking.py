@@ -125,6 +125,7 @@ def test_persons_never_walk_on_a_carriageway(name: str) -> None:
         assert allowed == {frozenset({"pedestrian"})}, edge
 
 
+@pytest.mark.slow
 @each_map
 def test_persons_do_not_go_a_longer_way_than_that_of_the_graph(name: str) -> None:
     pairs, run = walked(name)

@@ -89,6 +89,7 @@ def test_a_file_and_its_map_become_a_scenario_with_a_report(client: TestClient) 
     assert report["refused"] == []
 
 
+@pytest.mark.slow
 def test_rows_of_the_report_have_the_place_on_the_map_that_they_are_about(
     known: TestClient,
 ) -> None:
@@ -286,6 +287,7 @@ def test_an_export_to_sumo_has_all_that_it_needs(client: TestClient, sampled: st
     assert notes == {"files": sorted(files), "approximated": [], "left_out": []}
 
 
+@pytest.mark.slow
 def test_an_export_as_a_graph_is_the_download(client: TestClient, sampled: str) -> None:
     (content,) = opened(client, sampled, to="graphml").values()
     plain = client.get(f"/api/scenarios/{sampled}/download", params={"form": "graphml"})

@@ -46,6 +46,7 @@ def moments(content: bytes) -> tuple[Any, Any, Any]:
     return times, first, body.reshape(rows, COLUMNS)
 
 
+@pytest.mark.slow
 def test_a_recording_finds_its_map_and_is_looked_at_by_time(
     client: TestClient, recording: str
 ) -> None:
@@ -81,6 +82,7 @@ def test_a_recording_finds_its_map_and_is_looked_at_by_time(
     assert np.ptp(np.diff(few)) < 1e-6
 
 
+@pytest.mark.slow
 def test_a_part_becomes_a_scenario_with_its_tracks_as_ghosts(
     client: TestClient, recording: str
 ) -> None:
@@ -116,6 +118,7 @@ def test_a_part_becomes_a_scenario_with_its_tracks_as_ghosts(
     assert client.get(f"/api/scenarios/{job['result']}/ghosts").json() != []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "route"),
     [
@@ -146,6 +149,7 @@ def test_a_changed_byte_of_a_recording_is_noticed_and_hides_no_other(
     assert client.get("/api/recordings").json() == []
 
 
+@pytest.mark.slow
 def test_a_recording_that_lies_elsewhere_is_moved_onto_the_lanes(client: TestClient) -> None:
     away = crossing_traffic().with_columns(x=crossing_traffic()["x"] + 500.0)
     job = send(client, {"away.csv": away.write_csv().encode()})
@@ -221,6 +225,7 @@ def test_a_recording_that_is_being_placed_is_not_deleted_and_put_back(
     assert not list(workspace.recordings.iterdir())
 
 
+@pytest.mark.slow
 def test_of_a_recording_with_too_much_a_part_is_kept_or_asked_for(
     workspace: Workspace, recording: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

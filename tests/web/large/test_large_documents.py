@@ -64,6 +64,7 @@ def test_a_child_answers_all_that_is_asked_of_a_large_scenario(
     assert rows["other"]["actors"] == len(undone["document"]["actors"])
 
 
+@pytest.mark.slow
 def test_a_child_refuses_in_the_words_of_the_server(far: TestClient, sampled: str) -> None:
     stale = edit(far, sampled, 7, kind="set_seed", seed=1)
     assert (stale.status_code, stale.json()["error"]["current"]) == (409, 1)

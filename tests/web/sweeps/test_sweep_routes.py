@@ -246,6 +246,7 @@ def test_a_sweep_of_a_server_that_has_ended_is_stopped_and_can_be_deleted(
     assert client.get(f"/api/sweeps/{NAME}-99").status_code == 404
 
 
+@pytest.mark.slow
 def test_a_case_that_takes_too_long_is_given_up_by_the_estimate() -> None:
     plan = SweepPlan((axis_from_text("gap=10,20"),))
     data = json.loads(cut_in())

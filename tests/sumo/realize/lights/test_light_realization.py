@@ -91,6 +91,7 @@ def test_each_stage_is_shown_for_its_green_and_the_cycle_repeats(tmp_path: Path)
     assert {round(b - a, 3) for a, b in pairwise(firsts)} == {84.0}
 
 
+@pytest.mark.slow
 def test_no_intergreen_is_ever_shorter_than_the_paths_need(tmp_path: Path) -> None:
     for control in ("fixed", "actuated"):
         junction = program()
@@ -172,6 +173,7 @@ def test_a_vehicle_calls_the_stage_that_it_needs_and_others_are_left_out(
         assert 4 <= stages(seen).count(name) < stages(seen).count("1")
 
 
+@pytest.mark.slow
 def test_an_arrow_comes_on_call_for_who_found_no_gap_in_oncoming_traffic(tmp_path: Path) -> None:
     lefts = only_from(0, "4.0.1.64", control="fixed")
     assert "2" not in stages(shown(tmp_path / "alone", lefts))

@@ -51,6 +51,7 @@ def test_without_measures_nothing_is_written(town: LoadedMap) -> None:
     assert actions(town, late) == MeasureActions()
 
 
+@pytest.mark.slow
 def test_a_closed_road_is_closed_where_one_enters_it_and_stays_open_for_who_is_on_it(
     town: LoadedMap,
 ) -> None:

@@ -62,6 +62,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return run_prepared(prepare(scenario, sumo_map, net_file(MAP, folder)), folder / "run")
 
 
+@pytest.mark.slow
 def test_stations_of_the_study_are_measured_by_interval(run: Run) -> None:
     table = run.stations()
     assert table["station"].unique(maintain_order=True).to_list() == ["loop", "along", "part"]

@@ -53,6 +53,7 @@ def run(scenario: Scenario, folder: Path, **options: Any) -> pl.DataFrame:
     return visits
 
 
+@pytest.mark.slow
 def test_buses_keep_their_timetable_on_empty_roads(tmp_path: Path) -> None:
     visits = run(line(), tmp_path)
     assert visits["actor"].to_list() == ["7.0", "7.0", "7.1", "7.1", "7.2", "7.2"]

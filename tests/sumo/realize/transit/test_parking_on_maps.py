@@ -131,6 +131,7 @@ def test_without_parking_the_files_of_a_run_are_as_before() -> None:
     )
 
 
+@pytest.mark.slow
 def test_what_of_parking_cannot_be_done_is_said() -> None:
     town = parking_town().sumo
     near = parking_scenario({"end": 1.0, "stay": STAY})

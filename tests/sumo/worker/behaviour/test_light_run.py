@@ -94,6 +94,7 @@ def test_on_a_way_nothing_turns_green_and_what_ends_shows_yellow() -> None:
                 assert not (was == "r" and now in "gG")
 
 
+@pytest.mark.slow
 def test_a_light_is_switched_as_soon_as_it_may_and_by_its_way(tmp_path: Path) -> None:
     run = switched(tmp_path / "turns", name=f"{HERE}:InTurn")
     found, shown = light(), states(run)
@@ -136,6 +137,7 @@ def test_the_controls_that_ship_give_the_same_bytes_twice(tmp_path: Path, name: 
     assert first.read_bytes() == second.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_wrong_stage_fails_the_run_with_the_light_and_the_number(tmp_path: Path) -> None:
     run = switched(tmp_path / "wrong", name=f"{HERE}:Stubborn", options={"stage": 7.0})
     assert run.status == "failed"

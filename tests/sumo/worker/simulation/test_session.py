@@ -35,6 +35,7 @@ def run_script(body: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_second_session_is_refused_and_the_first_lives_on(grid: Path) -> None:
     result = run_script(
         """
@@ -55,6 +56,7 @@ with open_session(["-n", net, "--xml-validation", "never"]) as session:
     assert said["time"] == 2.0
 
 
+@pytest.mark.slow
 def test_a_session_can_follow_one_that_was_closed_by_an_error(grid: Path) -> None:
     result = run_script(
         """
@@ -72,6 +74,7 @@ with open_session(["-n", net, "--xml-validation", "never"]) as session:
     assert json.loads(result.stdout) == 0.0
 
 
+@pytest.mark.slow
 def test_a_refused_start_is_a_simulation_error_and_sumos_words_are_in_the_log(
     tmp_path: Path,
 ) -> None:
@@ -93,6 +96,7 @@ with captured_output(Path(sys.argv[2])) as stdout:
     assert "missing.net.xml" in log.read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="descriptors are checked through /bin/sh")
 def test_output_of_child_programs_is_captured_too_and_restored_afterwards(tmp_path: Path) -> None:
     log = tmp_path / "log"
@@ -126,6 +130,7 @@ print("clean")
     assert result.stderr == "Warning!"
 
 
+@pytest.mark.slow
 def test_somebody_who_waits_for_a_lane_change_long_before_the_turn_has_that_as_the_reason(
     tmp_path: Path,
 ) -> None:
@@ -175,6 +180,7 @@ with open_session(["-n", net, "-r", sys.argv[2], "--xml-validation", "never"]) a
     assert (lane, onwards, beside) == ("ab_0", False, True)
 
 
+@pytest.mark.slow
 def test_who_stands_in_a_junction_is_ahead_of_those_whose_way_is_crossed(
     grid: Path, tmp_path: Path
 ) -> None:
@@ -206,6 +212,7 @@ with open_session(["-n", net, "-r", sys.argv[2], "--xml-validation", "never"]) a
     assert json.loads(result.stdout) == [True, "foe", True]
 
 
+@pytest.mark.slow
 def test_lanes_for_vehicles_are_told_by_edge_and_those_inside_junctions_are_known(
     grid: Path,
 ) -> None:

@@ -104,6 +104,7 @@ def test_the_story_drives_no_pedestrian() -> None:
 SUPERMINI = {"length": 4.2, "width": 1.75}
 
 
+@pytest.mark.slow
 def test_bodies_have_their_size_and_start_exactly_where_they_are_put(tmp_path: Path) -> None:
     """CCRs with an overlap of 50 %: a free gap of 30 m, closed at 12 m/s after 2.5 s."""
     first, second = node_at(MOTORWAY, 370.0, MIDDLE), node_at(MOTORWAY, 405.0, MIDDLE)
@@ -136,6 +137,7 @@ def test_bodies_have_their_size_and_start_exactly_where_they_are_put(tmp_path: P
     assert [row["value"] for row in rows] == pytest.approx([12.0, 0.5, 0.0, 0.0], abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_the_instant_and_place_of_an_impact_while_braking_are_those_of_the_closed_form(
     tmp_path: Path, step: float
@@ -153,6 +155,7 @@ def test_the_instant_and_place_of_an_impact_while_braking_are_those_of_the_close
     assert hit.x == pytest.approx(other.x[0] - other.length, abs=0.05)
 
 
+@pytest.mark.slow
 def test_who_overlaps_at_first_is_told_and_those_whom_the_story_drives_may(tmp_path: Path) -> None:
     actors = [
         car("ego", 370.0, 12.0, ego=True),
@@ -174,6 +177,7 @@ def test_who_overlaps_at_first_is_told_and_those_whom_the_story_drives_may(tmp_p
     assert refused.severity == "error"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_who_is_in_a_lane_off_its_route_goes_on_along_it_at_its_speed(
     tmp_path: Path, step: float
@@ -195,6 +199,7 @@ def test_who_is_in_a_lane_off_its_route_goes_on_along_it_at_its_speed(
     assert ego.y[ego.time > 14.0] == pytest.approx([3.25] * int((ego.time > 14.0).sum()), abs=0.1)
 
 
+@pytest.mark.slow
 def test_one_that_reverses_hits_at_the_sum_of_the_speeds(tmp_path: Path) -> None:
     actors = [car("ego", 370.0, 5.0, ego=True), car("other", 400.0, 2.0)]
     back = {"points": [[380.0, MIDDLE], [340.0, MIDDLE]], "behind": 4.0, "backwards": True,

@@ -42,6 +42,7 @@ def end_of(found: Told) -> float:
 SLOWER = after(1.0, {"speed": {"to": 10.0, "over": 2.0}}, actor="van", name="slow")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_a_scene_ends_ten_seconds_after_its_last_rule(tmp_path: Path, step: float) -> None:
     """The rule is over at 3.0 s; the run ends with the step in which 13.0 s are over."""
@@ -55,6 +56,7 @@ def test_a_scene_ends_ten_seconds_after_its_last_rule(tmp_path: Path, step: floa
     assert summary["usable"] == {"level": "usable", "headline": "usable", "reasons": []}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("after_story", "least", "most"),
     [(2.0, 5.0, 5.2), (0.0, 3.0, 3.2), ("never", 20.0, ARRIVES)],
@@ -78,6 +80,7 @@ def test_a_run_with_traffic_is_one_of_traffic() -> None:
     assert RunSettings(meso=True).settle_time(scene([SLOWER])) is None
 
 
+@pytest.mark.slow
 def test_what_criteria_ask_about_arrivals_is_awaited(tmp_path: Path) -> None:
     made = scene([SLOWER], criteria=["arrived(other) == 1", "collided == 0"])
     assert prepared(made).plan.awaits == ("other",)
@@ -90,6 +93,7 @@ def test_what_criteria_ask_about_arrivals_is_awaited(tmp_path: Path) -> None:
     assert everyone == ("van", "other")
 
 
+@pytest.mark.slow
 def test_a_rule_that_never_fires_is_awaited_while_somebody_drives(tmp_path: Path) -> None:
     """It waits for a speed that is not reached: the run ends when both have arrived."""
     never = {"id": "never", "actor": "van", "when": {"speed": {"above": 90.0}},
