@@ -130,3 +130,11 @@ def test_files_that_a_document_names_are_there(path: Path) -> None:
     named = set(_FILE.findall(path.read_text(encoding="utf-8")))
     places = (ROOT, ROOT / "tests")
     assert [file for file in sorted(named) if not any((at / file).exists() for at in places)] == []
+
+
+def test_no_requirement_stands_twice_in_the_table() -> None:
+    rows = re.findall(
+        r"^\| (R\d[^|]*?) \|", (ROOT / "docs/requirements.md").read_text("utf-8"), re.MULTILINE
+    )
+    assert len(rows) > 50
+    assert sorted({row for row in rows if rows.count(row) > 1}) == []

@@ -81,6 +81,12 @@ class WalkNet:
 TRIM = 0.6
 """Metres that an edge keeps off the middle of a walking area."""
 
+_PART = "part"
+"""Of keys of nodes: where a walk is divided and nothing else meets it."""
+
+TRIM_WITHIN = 0.1
+"""The same where a walk is only divided: nobody turns there, and its metres are the map's."""
+
 
 def triple(place: FloatArray) -> tuple[float, float, float]:
     """x, y, z as plain numbers, from shape ``(3,)``."""
@@ -133,21 +139,21 @@ def divided(alignment: LaneAlignment, extent: float) -> tuple[LaneAlignment, Lan
     raise ValueError("nothing to divide")
 
 
-def trimmed(alignment: LaneAlignment, *, start: bool, end: bool) -> LaneAlignment:
-    """Take :data:`TRIM` off the ends that meet others, at most a quarter of the last stretch."""
+def trimmed(alignment: LaneAlignment, *, start: float, end: float) -> LaneAlignment:
+    """Take metres off the ends, at most a quarter of the last stretch."""
     result = list(alignment)
     if start:
         old = result[0]
-        result[0] = old._replace(start=old.start + cut(old))
+        result[0] = old._replace(start=old.start + cut(old, start))
     if end:
         old = result[-1]
-        result[-1] = old._replace(end=old.end - cut(old))
+        result[-1] = old._replace(end=old.end - cut(old, end))
     return tuple(result)
 
 
-def cut(stretch: Stretch) -> float:
+def cut(stretch: Stretch, trim: float) -> float:
     """By how much a stretch is shortened at a walking area: metres of s along its direction."""
-    return min(TRIM, stretch.extent / 4.0) * (1.0 if stretch.end > stretch.start else -1.0)
+    return min(trim, stretch.extent / 4.0) * (1.0 if stretch.end > stretch.start else -1.0)
 
 
 @dataclass(slots=True, eq=False)
@@ -238,7 +244,7 @@ class _WalkNetBuilder:
             if one is other or (one.junction and one.junction == other.junction):
                 # Of two parts both would join the same junctions, and SUMO could not tell
                 # whether a walk from one to the other goes over the middle or round the ends.
-                keys = [("part", len(alignments)), ("part", len(alignments) + 1)]
+                keys = [(_PART, len(alignments)), (_PART, len(alignments) + 1)]
                 alignments += thirds(alignment)
                 ends += [(first, keys[0]), (keys[0], keys[1]), (keys[1], last)]
             else:
@@ -246,11 +252,13 @@ class _WalkNetBuilder:
                 ends.append((first, last))
         meetings = Counter(key for pair in ends for key in pair)
 
-        def meets(key: NodeKey) -> bool:
-            return meetings[key] + self._walking_area_at(key).crossings > 1
+        def trim(key: NodeKey) -> float:
+            if key[0] == _PART:
+                return TRIM_WITHIN
+            return TRIM if meetings[key] + self._walking_area_at(key).crossings > 1 else 0.0
 
         cut_back = [
-            trimmed(alignment, start=meets(pair[0]), end=meets(pair[1]))
+            trimmed(alignment, start=trim(pair[0]), end=trim(pair[1]))
             for alignment, pair in zip(alignments, ends, strict=True)
         ]
         lines = evaluate(cut_back, self._table)
