@@ -23,15 +23,10 @@ import { tellError } from "../ui/notices";
 import { go, hashOf } from "../ui/address";
 import { when } from "../run/figures";
 import { served } from "../language/served";
+import { repeatedTitles, titleOf } from "./titles";
 
 /** So many are listed before the maps, the newest first. */
 const MOST = 6;
-
-/** Titles that several have. */
-function repeatedTitles(list: readonly ScenarioEntry[]): ReadonlySet<string> {
-  const titles = list.map((one) => one.title ?? one.name);
-  return new Set(titles.filter((title, n) => titles.indexOf(title) !== n));
-}
 
 /** The scenarios there are; one can be opened from a file. */
 export function Scenarios({
@@ -124,10 +119,8 @@ export function Scenarios({
             {shown.map((one) => (
               <Table.Tr key={one.name}>
                 <Table.Td>
-                  <Anchor href={hashOf({ view: "editor", scenario: one.name })}>
-                    {one.title ?? one.name}
-                  </Anchor>
-                  {ambiguous.has(one.title ?? one.name) && one.title !== one.name && (
+                  <Anchor href={hashOf({ view: "editor", scenario: one.name })}>{titleOf(one)}</Anchor>
+                  {ambiguous.has(titleOf(one)) && one.title !== one.name && (
                     <Text span size="xs" c="dimmed" ml={8}>
                       {one.name}
                     </Text>

@@ -4,6 +4,8 @@ import { Trans } from "@lingui/react/macro";
 import { type FormEvent, useState } from "react";
 
 import { api } from "../api/client";
+import { scenarioLabels } from "../catalogue/titles";
+import { nth } from "../lists";
 import { go } from "../ui/address";
 import { reasonOf } from "../ui/reason";
 import { useLoaded } from "../ui/useLoaded";
@@ -62,6 +64,7 @@ export function NameDialog({
 export function OpenDialog({ current, onClose }: { current: string; onClose: () => void }) {
   const { value, error } = useLoaded(api.scenarios);
   const others = value?.filter((one) => one.name !== current && !one.error);
+  const labels = scenarioLabels(others ?? []);
   return (
     <Modal opened onClose={onClose} title={t`Open another scenario`} centered>
       {error && <Alert color="red">{error}</Alert>}
@@ -72,7 +75,7 @@ export function OpenDialog({ current, onClose }: { current: string; onClose: () 
         </Text>
       )}
       <Stack gap={6}>
-        {others?.map((one) => (
+        {others?.map((one, n) => (
           <Button
             key={one.name}
             variant="default"
@@ -85,7 +88,7 @@ export function OpenDialog({ current, onClose }: { current: string; onClose: () 
               </Text>
             }
           >
-            {one.title ?? one.name}
+            {nth(labels, n)}
           </Button>
         ))}
       </Stack>

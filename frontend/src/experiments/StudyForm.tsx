@@ -5,6 +5,8 @@ import { useState } from "react";
 
 import { api } from "../api/client";
 import { studies } from "../api/studies";
+import { scenarioLabels } from "../catalogue/titles";
+import { nth } from "../lists";
 import { go, hashOf } from "../ui/address";
 import { tellError } from "../ui/notices";
 import { useLoaded } from "../ui/useLoaded";
@@ -41,6 +43,7 @@ export function StudyForm() {
         </Trans>
       </Text>
     );
+  const labels = scenarioLabels(whole);
   const runs = chosen.length * (1 + weather.length) * seeds;
   const start = (): void => {
     setStarting(true);
@@ -73,7 +76,7 @@ export function StudyForm() {
       <MultiSelect
         label={t`Scenarios`}
         placeholder={chosen.length === 0 ? t`Choose scenarios` : ""}
-        data={whole.map((one) => ({ value: one.name, label: one.title ?? one.name }))}
+        data={whole.map((one, n) => ({ value: one.name, label: nth(labels, n) }))}
         value={chosen}
         onChange={setChosen}
         searchable

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
 
 ATSPM = os.environ.get("ODSCEN_TEST_ATSPM", "")
-"""Python of an environment with the package atspm, which has two hours of a real controller."""
+"""Python of an environment with atspm 2.6 and duckdb before 1.4: two hours of a real controller."""
 START = datetime(2024, 4, 15, 12)
 PHASES = {
     "2": ("r1", "r3 straight", "r3 right"), "5": ("r3 left",), "8": ("r2", "r4"),
