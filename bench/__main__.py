@@ -41,6 +41,7 @@ ALL = (
     "server_load",
     "sizes",
     "carla_mirror",
+    "simulators_agree",
     "foreign_poses",
     "canvas",
     "scenery",

@@ -99,6 +99,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "Mean delay {b} s, today {a} s" }),
   msg({ message: "Means over the seeds." }),
   msg({ message: "Measure {id}" }),
+  msg({ message: "MetaDrive has no traffic lights and no weather: only SUMO's drivers react to them" }),
   msg({ message: "MetaDrive's IDM does not follow rule {id} of {actor}" }),
   msg({ message: "MetaDrive's ground is level: slopes have no effect on its physics" }),
   msg({ message: "MetaDrive's process ended with {returncode}: {said}" }),

@@ -110,7 +110,13 @@ class MetaDrive(Simulator[MetaDriveRun]):
     def unsupported(self, scenario: Scenario, on: SimulatedMap) -> tuple[Problem, ...]:
         """List what MetaDrive does not do of a scenario."""
         heights = on.graph.lanes.z
-        found = []
+        found = [
+            warning(
+                "not_in_metadrive",
+                "environment",
+                "MetaDrive has no traffic lights and no weather: only SUMO's drivers react to them",
+            )
+        ]
         if len(heights) and float(np.ptp(heights)) > 1.0:
             found.append(
                 warning(
