@@ -127,7 +127,7 @@ def test_a_tolerance_of_the_suite_lets_it_pass(store, suite):
     result = run(store, suite)
     assert result.exit_code == 0
     (line,) = lines(case(result, "signal_crossing"))
-    words = "changed since the baseline: the scenario's signals (signals, junction 10001: added ("
+    words = "changed since the baseline: the scenario's signals (signals, junction 10001: {"
     assert line.startswith(words)
 
 

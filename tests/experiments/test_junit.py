@@ -49,7 +49,7 @@ def test_scenarios_and_runs_are_test_cases_and_the_counts_are_theirs(root):
 def test_the_message_is_the_likeliest_cause_with_few_figures_and_the_worst_place(root):
     message = case_of(root, "signal_crossing").find("failure").get("message")
     assert re.match(
-        r"signals: signals, junction 10001: added \(.*\"green\": \[60.*\): \w+ is ", message
+        r"signals: signals, junction 10001: .* of the map -> {\"green\": \[60.*}: \w+ is ", message
     )
     assert "; most at junction j10001: waiting_time is " in message
     assert message.count(" was ") == 3

@@ -492,6 +492,7 @@ def _hold_case(
         fields = scenario_changes_since(
             case.baseline.parent, case.name, baseline.fingerprint, _as_run(loaded.run)
         )
+        fields = tuple(_with_map_times(change, loaded.run) for change in fields)
         causes = tuple(_with_fields(cause, fields) for cause in causes)
     failures = [*result.failures, *(change.words for change in verdict.failing)]
     failures += _forbidden_changes(case, names, changes or ())
@@ -550,6 +551,22 @@ def _with_fields(cause: Cause, changes: Sequence[ScenarioChange]) -> Cause:
     mine = [change.words for change in changes if cause.part and change.place[0] == cause.part]
     more = f"; and {len(mine) - _NAMED} more" if len(mine) > _NAMED else ""
     return replace(cause, details="; ".join(mine[:_NAMED]) + more)
+
+
+def _with_map_times(change: ScenarioChange, run: CheckedRun) -> ScenarioChange:
+    """The change of a light that has times of its own on one side: those of the map on the other.
+
+    They are those of the map as it is now.
+    """
+    if change.place[:2] != ("signals", "junctions") or change.kind == "changed":
+        return change
+    green = next((x.green for x in run.map.lights if change.place[2] in x.names), None)
+    if green is None:
+        return change
+    program = f"{json.dumps({'green': green})} of the map"
+    if change.kind == "added":
+        return replace(change, before=program)
+    return replace(change, after=program)
 
 
 def _describe_missing_seeds(
