@@ -742,3 +742,23 @@ def test_no_passenger_is_lost_and_stops_loads_and_delays_are_those_of_sumo(
     assert visits["boarded"].sum() == visits["alighted"].sum() == 39
     report = (odd_run.folder / "report.html").read_text()
     assert "On board on arrival" in report
+
+
+def test_files_may_be_named_by_variables_of_the_environment(
+    store: Workspace, project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = tmp_path / "elsewhere.sumocfg"
+    config.write_text(
+        '<configuration><input><net-file value="${NETWORKS}/grid.net.xml"/>'
+        '<route-files value="~/sub/cars.rou.xml"/></input></configuration>'
+    )
+    monkeypatch.delenv("NETWORKS", raising=False)
+    monkeypatch.setenv("HOME", str(project))
+    with pytest.raises(InputError, match="the environment has no variable NETWORKS") as refused:
+        import_file(store, config)
+    assert str(config) in str(refused.value)
+    monkeypatch.setenv("NETWORKS", str(project))
+    made = import_file(store, config).scenario
+    assert made is not None
+    assert made.sumo is not None
+    assert [file.name for file in made.sumo.files] == ["cars.rou.xml"]

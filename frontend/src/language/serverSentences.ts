@@ -1427,6 +1427,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "the end of the road of {entity}, which has no place" }),
   msg({ message: "the end of the run is a stop trigger, which has no name and no actor" }),
   msg({ message: "the entity is not among the actors" }),
+  msg({ message: "the environment has no variable {name}" }),
   msg({ message: "the expression {shown} is longer than {longest} characters" }),
   msg({ message: "the file declares XML entities; these are refused" }),
   msg({ message: "the file has no program for {repr}" }),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
 _FOLDERS_ABOVE: Final = 3
 """Folders above a file that may have the catalogs it names."""
+_VARIABLE: Final = re.compile(r"\$\{(\w+)\}")
 
 
 class ImportedFile(NamedTuple):
@@ -399,8 +401,23 @@ class DiskFile:
         return read_given(self.path, most=most)
 
     def other(self, named: str) -> DiskFile:
-        """A file that it names, relative to its folder."""
-        return DiskFile(self.path.parent / _with_slashes(named))
+        """A file that it names, relative to its folder; ``${NAME}`` and ``~/`` are filled in.
+
+        Raises
+        ------
+        InputError
+            If the environment has no variable of that name.
+        """
+        filled = _VARIABLE.sub(lambda match: self._read_variable(match[1], named), named)
+        return DiskFile(self.path.parent / Path(_with_slashes(filled)).expanduser())
+
+    def _read_variable(self, name: str, named: str) -> str:
+        value = os.environ.get(name)
+        if value is None:
+            raise InputError(
+                f"the environment has no variable {name}", element=named, file=self.where
+            )
+        return value
 
     def others(self, folders: Sequence[str], suffix: str) -> Iterator[DiskFile]:
         """All files with an ending in these folders, relative to its own or one above.
