@@ -14,7 +14,7 @@ MODULES := frontend/node_modules/.package-lock.json
 unexport PYTHONDONTWRITEBYTECODE
 NPM := cd frontend && PATH="$(CURDIR)/$(BIN):$$PATH" npm --silent
 
-.PHONY: demo test test-interchange test-interchange-part fuzz regression test-page chromium allocator page api api-changes check docs hooks format bench golden maps large-town check-maps check-wheel test-lowest test-newest screenshots clean
+.PHONY: demo test test-interchange test-interchange-part fuzz regression test-page chromium allocator page api api-changes check check-source check-page docs hooks format bench golden maps large-town check-maps check-wheel test-lowest test-newest screenshots clean
 
 # Set-up plus the main job: build the shipped maps, sample a scenario, run it, name the report.
 demo: $(READY)
@@ -60,13 +60,18 @@ allocator:
 api: $(READY) $(MODULES)
 	$(BIN)/python -m tools.api_schema
 
-check: $(READY) $(MODULES)
-	$(BIN)/python -m tools.api_schema --check
-	$(NPM) run check
+check: check-source check-page
+
+check-source: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The page, and that its types of all messages are those of the server.
+check-page: $(READY) $(MODULES)
+	$(BIN)/python -m tools.api_schema --check
+	$(NPM) run check
 
 # What of the public API would break for users of REF, the last release if not given; see docs/api.md.
 api-changes: $(READY)
