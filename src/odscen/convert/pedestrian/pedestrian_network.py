@@ -81,11 +81,15 @@ class WalkNet:
 TRIM = 0.6
 """Metres that an edge keeps off the middle of a walking area."""
 
-_PART = "part"
-"""Of keys of nodes: where a walk is divided and nothing else meets it."""
+_RING = "ring"
+"""Of keys of nodes: where a ring is divided and nothing else meets it."""
 
 TRIM_WITHIN = 0.1
-"""The same where a walk is only divided: nobody turns there, and its metres are the map's."""
+"""The same where a ring is only divided: nobody turns there, and its metres are the map's.
+
+Not where a sidewalk goes round the corner of a junction: the striping model of SUMO loses a part of
+a step in so small a walking area. In the shipped town that is 1.5 s of delay for each person.
+"""
 
 
 def triple(place: FloatArray) -> tuple[float, float, float]:
@@ -244,7 +248,8 @@ class _WalkNetBuilder:
             if one is other or (one.junction and one.junction == other.junction):
                 # Of two parts both would join the same junctions, and SUMO could not tell
                 # whether a walk from one to the other goes over the middle or round the ends.
-                keys = [(_PART, len(alignments)), (_PART, len(alignments) + 1)]
+                kind = _RING if one is other else "part"
+                keys = [(kind, len(alignments)), (kind, len(alignments) + 1)]
                 alignments += thirds(alignment)
                 ends += [(first, keys[0]), (keys[0], keys[1]), (keys[1], last)]
             else:
@@ -253,7 +258,7 @@ class _WalkNetBuilder:
         meetings = Counter(key for pair in ends for key in pair)
 
         def trim(key: NodeKey) -> float:
-            if key[0] == _PART:
+            if key[0] == _RING:
                 return TRIM_WITHIN
             return TRIM if meetings[key] + self._walking_area_at(key).crossings > 1 else 0.0
 
