@@ -13,6 +13,8 @@ from odscen.base.ids import RoadId
 from odscen.maps.importers.osm.road_plan import ease, write_geometry
 from odscen.maps.importers.osm.scenery import hermite
 from odscen.maps.importers.osm.street_line import Pose, curve_between
+from odscen.maps.joined_junctions import LONGEST, find_roads_between, join_junctions
+from odscen.maps.reshaped_roads import Displacement, add_profiles, redraw_road, reshape_road
 from odscen.opendrive import road_model as model
 from odscen.opendrive.lanes import RoadTable, is_forward
 from odscen.opendrive.objects import is_crosswalk, is_stop_line, object_outline, signal_kind
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 
 REACH = 6.0
 """Metres from an edit's place within which a line, light, sign or crosswalk is the one meant."""
+JUNCTION_REACH = 25.0
+"""Metres from a place within which a junction is the one meant."""
 BESIDE = 1.5
 """Metres beside a lane within which a place is still on it."""
 _TAPER = 20.0
@@ -38,6 +42,22 @@ _STOP_LINE = 0.4
 """Metres of a stop line along the road."""
 _STANDING = 0.6
 """Metres from the carriageway to a pole."""
+_LEAST_WIDTH = 0.3
+"""Metres that a lane keeps beside a border that is bent."""
+_LEAST_BEND = 2.0
+"""Metres on each side over which a lane border is bent, at least."""
+_LEAST_ROAD_BEND = 10.0
+"""Metres on each side over which a road is bent, at least."""
+_END_BEND = 60.0
+"""Metres before a road's end that move along with it, at most."""
+_END_REACH = 20.0
+"""Metres from an end of a road within which that end is the one meant."""
+_LEAST_RADIUS = 8.0
+"""Metres, of a road that is bent."""
+_LEAST_TURN = 2.0
+"""Metres, of the line of a connecting road that is drawn anew."""
+
+ObjectKind = Literal["stop line", "crosswalk", "island", "object"]
 
 Done = tuple[str, str]
 """Path of the element that was changed, and what became of it."""
@@ -79,7 +99,8 @@ class PlaceOnMap(NamedTuple):
     ring
         The lane from begin to end of its section, x and y in turn, metres.
     parts
-        What is within :data:`REACH`: ``stop_line``, ``crosswalk``, ``light``, ``sign``.
+        What is within :data:`REACH`: ``stop_line``, ``crosswalk``, ``light``, ``sign``,
+        ``island``, or another ``object``.
     """
 
     road: str
@@ -109,6 +130,7 @@ class EditedMap:
         )
         self._table: RoadTable | None = None
         self._points: tuple[IntArray, FloatArray, FloatArray] | None = None
+        self._outlines: list[tuple[ObjectKind, FoundPart, FloatArray]] | None = None
         roads = before.roads.values()
         self._taken = {item.id for road in roads for item in road.objects}
         self._taken |= {item.id for road in roads for item in road.signals}
@@ -238,17 +260,16 @@ class EditedMap:
 
         return min(lanes, key=rank)[1]
 
-    def find_object(
-        self, xy: tuple[float, float], kind: Literal["stop line", "crosswalk"]
-    ) -> FoundPart:
-        """Find the stop line or crosswalk nearest to a place."""
-        fits = is_stop_line if kind == "stop line" else is_crosswalk
-        parts = [
-            (_distance_to(outline[:, :2], xy), FoundPart(road.id, item.id))
-            for road in self.map.roads.values()
-            for item in filter(fits, road.objects)
-            for outline in object_outline(self.table, road.id, item)[:1]
-        ]
+    def find_object(self, xy: tuple[float, float], kind: ObjectKind) -> FoundPart:
+        """Find the stop line, crosswalk, island or other object nearest to a place."""
+        if self._outlines is None:
+            self._outlines = [
+                (_kind_of(item), FoundPart(road.id, item.id), outline[:, :2])
+                for road in self.map.roads.values()
+                for item in road.objects
+                for outline in object_outline(self.table, road.id, item)[:1]
+            ]
+        parts = [(_distance_to(ring, xy), part) for of, part, ring in self._outlines if of == kind]
         return self._nearest_part(parts, kind, xy)
 
     def find_signal(self, xy: tuple[float, float], kind: Literal["light", "sign"]) -> FoundPart:
@@ -281,7 +302,7 @@ class EditedMap:
         left, right = (np.stack([side.x, side.y], axis=1).round(3).tolist() for side in sides)
         turn = 0.0 if self.table.lane_forward[found.row] else math.pi
         parts = []
-        for kind in ("stop line", "crosswalk", "light", "sign"):
+        for kind in ("stop line", "crosswalk", "light", "sign", "island", "object"):
             try:
                 if kind in ("light", "sign"):
                     self.find_signal((x, y), kind)  # type: ignore[arg-type]
@@ -318,6 +339,7 @@ class EditedMap:
     # ------------------------------------------------------------------ changes
     def _replace_road(self, road: model.Road, *, shape: bool = False) -> None:
         self.map.roads[road.id] = road
+        self._outlines = None
         if shape:
             self._table = self._points = None
 
@@ -379,16 +401,24 @@ class EditedMap:
         )
         if abs(first - width) < 1e-9:
             widths = (model.Cubic(s0, width, 0.0, 0.0, 0.0), *widths[1:])
-        side = math.copysign(1.0, lane.id)
         border = self._outer_border(found.row)
         self._replace_lane(found.key, replace(lane, widths=widths), shape=True)
-        road = self.map.roads[road.id]
         after = self._widths_at(self.table.lane_index[found.key])
+        self._move_beside(found.key, border, lambda s: after(s) - before(s))
+        was = before((s0 + s1) / 2.0)
+        return _lane_path(found.key), f"{width:g} m wide, was {was:.2f} m"
+
+    def _move_beside(
+        self, key: LaneKey, border: Callable[[float], float], by: Callable[[float], float]
+    ) -> None:
+        """Move objects and signals outside of a lane's outer border away from the middle."""
+        road = self.map.roads[key.road]
+        section, side = road.sections[key.section], math.copysign(1.0, key.lane)
 
         def moved(s: float, t: float) -> float:
-            if not s0 <= s < s1 or side * t < side * border(s) - 1e-6:
+            if not section.s <= s < section.s_end or side * t < side * border(s) - 1e-6:
                 return t
-            return t + side * (after(s) - before(s))
+            return t + side * by(s)
 
         objects = tuple(
             replace(item, t=moved(item.s, item.t), outlines=tuple(
@@ -407,8 +437,6 @@ class EditedMap:
         self._replace_road(
             replace(road, objects=objects, signals=signals, signal_references=references)
         )
-        was = before((s0 + s1) / 2.0)
-        return _lane_path(found.key), f"{width:g} m wide, was {was:.2f} m"
 
     def _widths_at(self, row: int) -> Callable[[float], float]:
         table = self.table
@@ -448,6 +476,19 @@ class EditedMap:
         words = [f"type {changed.type}", *(f"{rule} {name}" for rule, name in rules)]
         return _lane_path(found.key), ", ".join(words)
 
+    def _find_border(self, xy: tuple[float, float], hdg: float | None) -> LaneKey:
+        """The lane whose outer border is the nearest to a place; 0 for the line in the middle."""
+        borders = []
+        for _, found in self._lanes_near(*xy, hdg, connecting=True):
+            inner, outer = self.table.lane_borders(np.array([found.row]), np.array([found.s]))
+            number = found.key.lane
+            towards = number - 1 if number > 0 else number + 1
+            borders.append((abs(float(outer[0]) - found.t), found.key))
+            borders.append((abs(float(inner[0]) - found.t), found.key._replace(lane=towards)))
+        if not borders:
+            raise EditRefusedError(f"there is no lane border at x {xy[0]:.1f} m, y {xy[1]:.1f} m")
+        return min(borders, key=lambda border: (round(border[0], 6), border[1]))[1]
+
     def paint_border(
         self,
         xy: tuple[float, float],
@@ -462,16 +503,7 @@ class EditedMap:
         EditRefusedError
             If there is none.
         """
-        borders = []
-        for _, found in self._lanes_near(*xy, hdg, connecting=True):
-            inner, outer = self.table.lane_borders(np.array([found.row]), np.array([found.s]))
-            number = found.key.lane
-            towards = number - 1 if number > 0 else number + 1
-            borders.append((abs(float(outer[0]) - found.t), found.key))
-            borders.append((abs(float(inner[0]) - found.t), found.key._replace(lane=towards)))
-        if not borders:
-            raise EditRefusedError(f"there is no lane border at x {xy[0]:.1f} m, y {xy[1]:.1f} m")
-        key = min(borders, key=lambda border: (round(border[0], 6), border[1]))[1]
+        key = self._find_border(xy, hdg)
         lane = self._lane_model(key)
         start = self.map.roads[key.road].sections[key.section].s
         solid = mark.startswith("solid") or mark == "curb"
@@ -481,6 +513,172 @@ class EditedMap:
         painted = model.RoadMark(start, mark, color, weight, old.width if old else 0.12, change)
         self._replace_lane(key, replace(lane, road_marks=(painted,)), shape=True)
         return _lane_path(key), f"road mark {mark}, lane change {change}"
+
+    # ------------------------------------------------------------------ shapes
+    def _station_on(
+        self, road: RoadId, xy: tuple[float, float], what: str = "second place"
+    ) -> tuple[float, float]:
+        """S and t of a place on a certain road."""
+        row = self.table.road_index[road]
+        for near, s, t in self._roads_near(*xy):
+            if near == row:
+                return s, t
+        raise EditRefusedError(f"the {what} is not beside road {road}")
+
+    def bend_border(
+        self, xy: tuple[float, float], hdg: float | None, to: tuple[float, float], length: float
+    ) -> Done:
+        """Lead the lane border nearest to a place through another; the next borders stay.
+
+        Raises
+        ------
+        EditRefusedError
+            If there is none, the other place is not beside it, or a lane would be too narrow.
+        """
+        key = self._find_border(xy, hdg)
+        road = self.map.roads[key.road]
+        section = road.sections[key.section]
+        if any(lane.borders and not lane.widths for lane in section.lanes.values()):
+            raise EditRefusedError("its lanes are given by borders, not by widths")
+        s, t = self._station_on(key.road, to)
+        before = min(length / 2.0, s - section.s)
+        after = min(length / 2.0, section.s_end - s)
+        if min(before, after) < _LEAST_BEND:
+            raise EditRefusedError(
+                f"the second place is within {_LEAST_BEND:g} m of an end of its lane section"
+            )
+        rows = np.array([self.table.road_index[key.road]])
+        at = np.array([s])
+        now = float(self.table.lane_offset(rows, at)[0])
+        if key.lane:
+            now = self._outer_border(self.table.lane_index[key])(s)
+        by = t - now
+        bump = (*ease(s - before, 0.0, by, before)[:1], *ease(s, by, 0.0, after))
+        # Positive on the left: what a lane gains on one side of its border, its neighbour loses.
+        inside, outside = (key.lane, key.lane + (1 if key.lane > 0 else -1))
+        shares = {inside: math.copysign(1.0, key.lane), outside: -math.copysign(1.0, outside)}
+        if not key.lane:
+            shares = {1: -1.0, -1: 1.0}
+        shares = {number: share for number, share in shares.items() if number in section.lanes}
+        steps = np.arange(s - before, s + after, 0.5)
+        outer = self._outer_border(self.table.lane_index[key]) if key.lane else None
+        for number, share in shares.items():
+            lane_key = key._replace(lane=number)
+            row = np.full(steps.size, self.table.lane_index[lane_key])
+            widths = self.table.lane_width(row, steps)
+            gained = [share * value for value in _values_of(bump, steps)]
+            narrow = float(np.min(np.where(np.abs(gained) > 1e-6, widths + gained, np.inf)))
+            if narrow < _LEAST_WIDTH:
+                raise EditRefusedError(f"lane {number} would be {max(narrow, 0.0):.2f} m wide")
+        for number, share in shares.items():
+            lane_key = key._replace(lane=number)
+            lane = self._lane_model(lane_key)
+            gain = [
+                model.Cubic(c.s, *(share * value for value in c[1:]))
+                for c in bump
+                if c.s < section.s_end - 1e-6
+            ]
+            bent = add_profiles(lane.widths, gain)
+            self._replace_lane(lane_key, replace(lane, widths=bent), shape=True)
+        if not key.lane:
+            road = self.map.roads[key.road]
+            offset = add_profiles(road.lane_offset or (model.Cubic(0.0, 0.0, 0.0, 0.0, 0.0),), bump)
+            self._replace_road(replace(road, lane_offset=offset), shape=True)
+        elif outer is not None and outside not in section.lanes:
+            self._move_beside(
+                key, outer, lambda at: shares[inside] * _values_of(bump, np.array([at]))[0]
+            )
+        path = f"{_lane_path(key)} > border"
+        return path, f"led {abs(by):.2f} m to the {'left' if by > 0 else 'right'} at s {s:.1f} m"
+
+    def bend_road(self, found: FoundLane, to: tuple[float, float], length: float) -> Done:
+        """Lead a road through a place beside it, over a length; its ends stay.
+
+        Raises
+        ------
+        EditRefusedError
+            If it is in a junction, too near an end, or the bend would be too tight.
+        """
+        road = self.map.roads[found.key.road]
+        if road.junction is not None:
+            raise EditRefusedError("a connecting road of a junction: move the ends of its roads")
+        s, t = self._station_on(road.id, to)
+        begin, end = max(0.0, s - length / 2.0), min(road.length, s + length / 2.0)
+        if min(s - begin, end - s) < _LEAST_ROAD_BEND:
+            raise EditRefusedError(
+                f"it is within {_LEAST_ROAD_BEND:g} m of an end of the road: move that end"
+            )
+        line = self.table.reference(np.array([self.table.road_index[road.id]]), np.array([s]))
+        by = t - found.t
+        hdg = float(line.hdg[0])
+        shift = Displacement(-by * math.sin(hdg), by * math.cos(hdg), begin, s, end)
+        self._set_reshaped([reshape_road(road, self.table, shift)])
+        side = "left" if by > 0 else "right"
+        return f"road {road.id}", f"led {abs(by):.2f} m to the {side} at s {s:.1f} m"
+
+    def _set_reshaped(self, reshaped: Sequence[tuple[model.Road, float]]) -> None:
+        """Take roads with another line, if none is too tight to drive."""
+        for road, radius in reshaped:
+            allowed = _LEAST_RADIUS if road.junction is None else _LEAST_TURN
+            if radius < allowed:
+                raise EditRefusedError(
+                    f"road {road.id} would have a bend of {radius:.1f} m, at least {allowed:g} m "
+                    "are needed"
+                )
+        for road, _ in reshaped:
+            self._replace_road(road, shape=True)
+
+    def move_road_end(
+        self, found: FoundLane, xy: tuple[float, float], to: tuple[float, float]
+    ) -> Done:
+        """Move the end of a road nearest to a place; what is linked to it follows.
+
+        The road keeps its direction there; connecting roads are drawn anew.
+
+        Raises
+        ------
+        EditRefusedError
+            If the place is too far from an end, or a bend would be too tight.
+        """
+        road = self.map.roads[found.key.road]
+        if road.junction is not None:
+            raise EditRefusedError("a connecting road of a junction: move the ends of its roads")
+        at_end = found.s > road.length / 2.0
+        away = road.length - found.s if at_end else found.s
+        if away > _END_REACH:
+            raise EditRefusedError(f"the end of its road is {away:.0f} m away")
+        by = (to[0] - xy[0], to[1] - xy[1])
+        contact = "end" if at_end else "start"
+        reshaped = [self._move_end(road, contact, by)]
+        link = road.successor if at_end else road.predecessor
+        if link is not None and link.element_type == "road":
+            other = self.map.roads[RoadId(link.element_id)]
+            if link.contact_point is not None and other.id != road.id:
+                reshaped.append(self._move_end(other, link.contact_point, by))
+        elif link is not None:
+            still = (0.0, 0.0)
+            for other in self.map.roads.values():
+                if other.junction != link.element_id or other.id == road.id:
+                    continue
+                ends = [
+                    by if _leads_to(end, road.id, contact) else still
+                    for end in (other.predecessor, other.successor)
+                ]
+                if ends != [still, still]:
+                    reshaped.append(redraw_road(other, self.table, *ends))
+        self._set_reshaped(reshaped)
+        rest = f", with {len(reshaped) - 1} roads" if len(reshaped) > 1 else ""
+        return f"road {road.id}", f"{contact} moved by {math.hypot(*by):.2f} m{rest}"
+
+    def _move_end(
+        self, road: model.Road, contact: str, by: tuple[float, float]
+    ) -> tuple[model.Road, float]:
+        reach = min(_END_BEND, 0.8 * road.length)
+        if contact == "end":
+            shift = Displacement(*by, road.length - reach, road.length, road.length)
+        else:
+            shift = Displacement(*by, 0.0, 0.0, reach)
+        return reshape_road(road, self.table, shift)
 
     # ------------------------------------------------------------------ objects
     def _add_object(
@@ -565,19 +763,29 @@ class EditedMap:
         self._replace_road(replace(road, objects=rest))
         return f"road {part.road} > object {part.id}", "removed"
 
-    def move_object(self, part: FoundPart, by: float) -> Done:
-        """Move an object along its road, in the direction that it is for."""
+    def move_object(
+        self, part: FoundPart, by: float, to: tuple[float, float] | None, *, beside: bool = False
+    ) -> Done:
+        """Move an object along its road, in the direction that it is for, or to a place.
+
+        Only what may be ``beside`` its place on the road changes its t, too.
+        """
         road = self.map.roads[part.road]
         item = next(item for item in road.objects if item.id == part.id)
-        s = self._moved_along(road, item.s, by, item.orientation)
+        t = item.t
+        if to is None:
+            s = self._moved_along(road, item.s, by, item.orientation)
+        else:
+            s, there = self._station_on(road.id, to)
+            t = there if beside else t
         items = tuple(
-            replace(other, s=s, outlines=_shifted_along(other, s - other.s))
+            replace(other, s=s, t=t, outlines=_shifted_along(other, s - other.s, t - other.t))
             if other.id == part.id
             else other
             for other in road.objects
         )
         self._replace_road(replace(road, objects=items))
-        return f"road {part.road} > object {part.id}", f"moved from s {item.s:.1f} to {s:.1f} m"
+        return f"road {part.road} > object {part.id}", _say_moved(item.s, item.t, s, t)
 
     def _moved_along(self, road: model.Road, s: float, by: float, orientation: str) -> float:
         moved = s - by if orientation == "-" else s + by
@@ -653,14 +861,84 @@ class EditedMap:
                 self.map.junctions[junction.id] = replace(junction, controllers=left)
         return f"road {part.road} > signal {part.id}", "removed"
 
-    def move_signal(self, part: FoundPart, by: float) -> Done:
-        """Move a light or sign along its road, in the direction that it is for."""
+    def move_signal(self, part: FoundPart, by: float, to: tuple[float, float] | None) -> Done:
+        """Move a light or sign along its road, in the direction that it is for, or to a place."""
         road = self.map.roads[part.road]
         signal = next(signal for signal in road.signals if signal.id == part.id)
-        s = self._moved_along(road, signal.s, by, signal.orientation)
-        signals = tuple(replace(o, s=s) if o.id == part.id else o for o in road.signals)
+        if to is None:
+            s, t = self._moved_along(road, signal.s, by, signal.orientation), signal.t
+        else:
+            s, t = self._station_on(road.id, to)
+        signals = tuple(replace(o, s=s, t=t) if o.id == part.id else o for o in road.signals)
         self._replace_road(replace(road, signals=signals))
-        return f"road {part.road} > signal {part.id}", f"moved from s {signal.s:.1f} to {s:.1f} m"
+        return f"road {part.road} > signal {part.id}", _say_moved(signal.s, signal.t, s, t)
+
+    # ------------------------------------------------------------------ junctions
+    def find_junction(self, xy: tuple[float, float]) -> JunctionId:
+        """Find the junction at a place, or the nearest within :data:`JUNCTION_REACH`.
+
+        Raises
+        ------
+        EditRefusedError
+            If there is none.
+        """
+        near: list[tuple[float, JunctionId]] = []
+        for row, s, t in self._roads_near(*xy):
+            road = self.map.roads[self.table.road_ids[row]]
+            if road.junction is not None:
+                near.append((abs(t), road.junction))
+                continue
+            for link, away in ((road.predecessor, s), (road.successor, road.length - s)):
+                if link is not None and link.element_type == "junction":
+                    near.append((math.hypot(away, t) + 1.0, link.element_id))  # type: ignore[arg-type]
+        near = [(away, name) for away, name in near if away <= JUNCTION_REACH]
+        if not near:
+            where = f"x {xy[0]:.1f} m, y {xy[1]:.1f} m"
+            raise EditRefusedError(f"there is no junction within {JUNCTION_REACH:g} m of {where}")
+        return min(near)[1]
+
+    def join_junctions(self, first: JunctionId, second: JunctionId) -> Done:
+        """Make one junction of two and the roads between them.
+
+        Raises
+        ------
+        EditRefusedError
+            If they are the same, or no short road leads from the one to the other.
+        """
+        if first == second:
+            raise EditRefusedError(f"both places are at junction {first}")
+        between = find_roads_between(self.map, first, second)
+        if not between:
+            raise EditRefusedError(
+                f"no road leads from junction {first} directly to junction {second}"
+            )
+        longest = max(self.map.roads[number].length for number in between)
+        if longest > LONGEST:
+            raise EditRefusedError(
+                f"{longest:.0f} m are between the junctions, more than {LONGEST:g} m"
+            )
+        joined = join_junctions(self.map, self.table, first, second)
+        for road, signal in joined.signals:
+            self.remove_signal(FoundPart(road, signal))
+        controllers = tuple(
+            name for name in joined.map.junctions[first].controllers if name in self.map.controllers
+        )
+        junctions = dict(joined.map.junctions)
+        junctions[first] = replace(junctions[first], controllers=controllers)
+        roads = {
+            number: replace(road, signal_references=self.map.roads[number].signal_references)
+            if number in self.map.roads
+            else road
+            for number, road in joined.map.roads.items()
+        }
+        self.map = replace(self.map, roads=roads, junctions=junctions)
+        self._table = self._points = self._outlines = None
+        parts = [
+            f"{len(joined.turns)} turns in place of {_count(len(between), 'road')}",
+            *([_count(len(joined.signals), "signal")] if joined.signals else []),
+            *([_count(joined.crosswalks, "crosswalk")] if joined.crosswalks else []),
+        ]
+        return f"junction {first}", f"joined with junction {second}: {', '.join(parts)}"
 
     # ------------------------------------------------------------------ turns
     def _through(self, start: FoundLane, end: FoundLane) -> tuple[JunctionId, list[LaneKey]]:
@@ -729,7 +1007,7 @@ class EditedMap:
             rest = tuple(p for p in junction.priorities if road_id not in p)
             if rest != junction.priorities:
                 self.map.junctions[junction.id] = replace(junction, priorities=rest)
-        self._table = self._points = None
+        self._table = self._points = self._outlines = None
 
     def add_turn(self, start: FoundLane, end: FoundLane) -> Done:
         """Draw a connecting road of one lane from lane to lane.
@@ -820,11 +1098,48 @@ def _lane_path(key: LaneKey) -> str:
     return f"road {key.road} > laneSection {key.section} > lane {key.lane}"
 
 
-def _shifted_along(item: model.RoadObject, by: float) -> tuple[model.Outline, ...]:
+def _kind_of(item: model.RoadObject) -> ObjectKind:
+    if is_stop_line(item):
+        return "stop line"
+    if is_crosswalk(item):
+        return "crosswalk"
+    return "island" if item.type == "trafficIsland" else "object"
+
+
+def _leads_to(link: model.RoadLink | None, road: RoadId, contact: str) -> bool:
+    return link is not None and link.element_id == road and link.contact_point == contact
+
+
+def _values_of(profile: Sequence[model.Cubic], s: FloatArray) -> list[float]:
+    """Values of a profile at stations; zero before its start."""
+    values = []
+    for at in s.tolist():
+        before = [cubic for cubic in profile if cubic.s <= at]
+        start, a, b, c, d = before[-1] if before else (at, 0.0, 0.0, 0.0, 0.0)
+        h = at - start
+        values.append(a + h * (b + h * (c + h * d)))
+    return values
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _say_moved(s: float, t: float, to_s: float, to_t: float) -> str:
+    if t == to_t:
+        return f"moved from s {s:.1f} to {to_s:.1f} m"
+    return f"moved from s {s:.1f} m, t {t:.1f} m to s {to_s:.1f} m, t {to_t:.1f} m"
+
+
+def _shifted_along(
+    item: model.RoadObject, by: float, beside: float = 0.0
+) -> tuple[model.Outline, ...]:
     """Outlines of an object with those corners moved that are in road coordinates."""
     return tuple(
         outline._replace(
-            corners=tuple(c if c.local else c._replace(a=c.a + by) for c in outline.corners)
+            corners=tuple(
+                c if c.local else c._replace(a=c.a + by, b=c.b + beside) for c in outline.corners
+            )
         )
         for outline in item.outlines
     )

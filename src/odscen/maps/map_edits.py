@@ -65,6 +65,24 @@ class _Edit(_Strict):
     at: MapPlace
 
 
+class _Moving(_Edit):
+    """An edit that may move something: ``to`` a place, or ``by`` metres along its road."""
+
+    by: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    to: MapPlace | None = None
+
+    @model_validator(mode="after")
+    def _check_target(self) -> _Moving:
+        kind = str(getattr(self, "kind", ""))
+        if kind.startswith("move_") and self.to is None and not self.by:
+            raise ValueError(f"{kind} needs to or by")
+        return self
+
+    def target(self, bench: EditedMap) -> tuple[float, float] | None:
+        """Where it is moved to, metres of the map."""
+        return None if self.to is None else bench.place_of(self.to)
+
+
 class LaneWidth(_Edit):
     """Give a lane a width, metres, but for a taper at both ends of its section."""
 
@@ -129,14 +147,13 @@ class RoadMarkEdit(_Edit):
         return bench.paint_border(xy, self.at.hdg, self.mark, self.lane_change)
 
 
-class StopLineEdit(_Edit):
+class StopLineEdit(_Moving):
     """Add a stop line for the lanes of the direction there, remove the nearest or move it.
 
-    ``by`` is metres in the direction of driving.
+    It is moved ``to`` a place on its road, or ``by`` metres in the direction of driving.
     """
 
     kind: Literal["add_stop_line", "remove_stop_line", "move_stop_line"]
-    by: Annotated[float, Field(ge=-100, le=100)] = 0.0
 
     def apply(self, bench: EditedMap, xy: tuple[float, float]) -> tuple[str, str]:
         """Do it; returns the element and what became of it."""
@@ -145,20 +162,37 @@ class StopLineEdit(_Edit):
         line = bench.find_object(xy, "stop line")
         if self.kind == "remove_stop_line":
             return bench.remove_object(line)
-        return bench.move_object(line, self.by)
+        return bench.move_object(line, self.by, self.target(bench))
 
 
-class CrosswalkEdit(_Edit):
-    """Add a crosswalk over the carriageway, ``width`` metres along the road, or remove it."""
+class CrosswalkEdit(_Moving):
+    """Add a crosswalk over the carriageway, ``width`` metres along the road, remove or move it."""
 
-    kind: Literal["add_crosswalk", "remove_crosswalk"]
+    kind: Literal["add_crosswalk", "remove_crosswalk", "move_crosswalk"]
     width: Annotated[float, Field(ge=1.0, le=20.0)] = 4.0
 
     def apply(self, bench: EditedMap, xy: tuple[float, float]) -> tuple[str, str]:
         """Do it; returns the element and what became of it."""
         if self.kind == "add_crosswalk":
             return bench.add_crosswalk(bench.find_lane(*xy, self.at.hdg), self.width)
-        return bench.remove_object(bench.find_object(xy, "crosswalk"))
+        walk = bench.find_object(xy, "crosswalk")
+        if self.kind == "remove_crosswalk":
+            return bench.remove_object(walk)
+        return bench.move_object(walk, self.by, self.target(bench))
+
+
+class ObjectEdit(_Moving):
+    """Remove the island or other object (tree, pole, building) nearest to the place, or move it."""
+
+    kind: Literal["remove_island", "move_island", "remove_object", "move_object"]
+
+    def apply(self, bench: EditedMap, xy: tuple[float, float]) -> tuple[str, str]:
+        """Do it; returns the element and what became of it."""
+        action, _, what = self.kind.partition("_")
+        part = bench.find_object(xy, "island" if what == "island" else "object")
+        if action == "remove":
+            return bench.remove_object(part)
+        return bench.move_object(part, self.by, self.target(bench), beside=True)
 
 
 class AddIsland(_Edit):
@@ -173,11 +207,13 @@ class AddIsland(_Edit):
         return bench.add_island(bench.find_lane(*xy, self.at.hdg), xy, self.length, self.width)
 
 
-class SignalEdit(_Edit):
-    """Remove the light or sign nearest to the place, or move it ``by`` metres along its road."""
+class SignalEdit(_Moving):
+    """Remove the light or sign nearest to the place, or move it.
+
+    It is moved ``to`` a place beside its road, or ``by`` metres along it.
+    """
 
     kind: Literal["remove_light", "move_light", "remove_sign", "move_sign"]
-    by: Annotated[float, Field(ge=-100, le=100)] = 0.0
 
     def apply(self, bench: EditedMap, xy: tuple[float, float]) -> tuple[str, str]:
         """Do it; returns the element and what became of it."""
@@ -185,7 +221,7 @@ class SignalEdit(_Edit):
         signal = bench.find_signal(xy, "light" if what == "light" else "sign")
         if action == "remove":
             return bench.remove_signal(signal)
-        return bench.move_signal(signal, self.by)
+        return bench.move_signal(signal, self.by, self.target(bench))
 
 
 class AddSign(_Edit):
@@ -230,6 +266,48 @@ class TurnEdit(_Edit):
         return (bench.add_turn if self.kind == "add_turn" else bench.remove_turn)(start, end)
 
 
+class BendEdit(_Edit):
+    """Lead the lane border nearest to the place, or the road, through ``to``.
+
+    ``length`` is metres of the bend along the road, the same before and behind.
+    """
+
+    kind: Literal["bend_border", "bend_road"]
+    to: MapPlace
+    length: Metres = 40.0
+
+    def apply(self, bench: EditedMap, xy: tuple[float, float]) -> tuple[str, str]:
+        """Do it; returns the element and what became of it."""
+        to = bench.place_of(self.to)
+        if self.kind == "bend_border":
+            return bench.bend_border(xy, self.at.hdg, to, self.length)
+        return bench.bend_road(bench.find_lane(*xy, self.at.hdg), to, self.length)
+
+
+class RoadEndEdit(_Edit):
+    """Move the end of a road nearest to the place as far as ``to`` is from the place."""
+
+    kind: Literal["move_road_end"]
+    to: MapPlace
+
+    def apply(self, bench: EditedMap, xy: tuple[float, float]) -> tuple[str, str]:
+        """Do it; returns the element and what became of it."""
+        found = bench.find_lane(*xy, self.at.hdg, connecting=False)
+        return bench.move_road_end(found, xy, bench.place_of(self.to))
+
+
+class JoinJunctions(_Edit):
+    """Make one junction of that at the place, that at ``to`` and the roads between them."""
+
+    kind: Literal["join_junctions"]
+    to: MapPlace
+
+    def apply(self, bench: EditedMap, xy: tuple[float, float]) -> tuple[str, str]:
+        """Do it; returns the element and what became of it."""
+        second = bench.find_junction(bench.place_of(self.to))
+        return bench.join_junctions(bench.find_junction(xy), second)
+
+
 MapEdit = Annotated[
     LaneWidth
     | LaneLimit
@@ -238,10 +316,14 @@ MapEdit = Annotated[
     | StopLineEdit
     | CrosswalkEdit
     | AddIsland
+    | ObjectEdit
     | SignalEdit
     | AddSign
     | AddLight
-    | TurnEdit,
+    | TurnEdit
+    | BendEdit
+    | RoadEndEdit
+    | JoinJunctions,
     Field(discriminator="kind"),
 ]
 _EDITS: TypeAdapter[list[MapEdit]] = TypeAdapter(list[MapEdit])

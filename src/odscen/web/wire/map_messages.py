@@ -187,7 +187,7 @@ class PlaceInfo(Answer):
     limit: float | None
     hdg: float
     ring: list[float]
-    parts: list[Literal["stop_line", "crosswalk", "light", "sign"]]
+    parts: list[Literal["stop_line", "crosswalk", "light", "sign", "island", "object"]]
 
 
 class BackgroundInfo(Answer):
