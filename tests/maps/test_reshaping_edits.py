@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from odscen.base.ids import JunctionId, RoadId
-from odscen.maps.map_edits import check_edits, mend_map
+from odscen.maps.edited_map import EditedMap
+from odscen.maps.map_edits import check_edits, mend_map, try_edit
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.opendrive.lanes import RoadTable
@@ -112,7 +113,7 @@ def test_the_end_of_a_road_is_moved_and_the_junction_follows() -> None:
     model, result = mended(
         {"kind": "move_road_end", "at": at, "to": aside(at, ahead=-2.0, left=3.0)}
     )
-    assert done(result) == [("repaired", "end moved by 3.61 m, with 8 roads")]
+    assert done(result) == [("repaired", "end moved by 3.61 m; roads that follow it: 8")]
     table, row = RoadTable.of(model), np.array([TABLE.road_index[RoadId("1")]])
     was = TABLE.reference(row, np.array([130.0]))
     now = table.reference(row, np.array([model.roads[RoadId("1")].length]))
@@ -168,7 +169,7 @@ def test_two_junctions_are_joined_and_each_way_through_both_becomes_a_turn() -> 
     ((fate, words),) = done_rows(result.entries)
     assert (fate, words) == (
         "repaired",
-        "joined with junction 10017: 8 turns in place of 1 road, 2 signals, 2 crosswalks",
+        "joined with junction 10017; turns drawn: 8, signals removed: 2, crosswalks removed: 2",
     )
     model = parse(result.xodr)
     assert model.notes == before.notes
@@ -223,3 +224,18 @@ def test_maps_with_bends_and_joined_junctions_hold_verify(tmp_path: Path) -> Non
     for entry in (bent, joined):
         assert {row["fate"] for row in entry.edit_rows()} == {"repaired"}
         assert [v.name for v in entry.fidelity().verdicts if not v.ok] == []
+
+
+def test_an_edit_is_tried_on_a_map_that_stays_as_it_is() -> None:
+    bench = EditedMap(BEFORE)
+    border = place("1", -1, 60.0, at=1.0)
+    bend = {"kind": "bend_border", "at": border, "to": aside(border, left=1.0)}
+    line = {"kind": "add_stop_line", "at": place("3", 1, 50.0)}
+    far = {"kind": "add_stop_line", "at": {"x": 900.0, "y": 900.0}}
+    (bent, lanes), (_, marks), (lost, nothing) = (
+        try_edit(bench, edit) for edit in check_edits([bend, line, far])
+    )
+    assert (str(bent.outcome), str(lost.outcome)) == ("repaired", "lost")
+    assert len(lanes) == len(BEFORE.roads[RoadId("1")].sections[0].lanes) - 1
+    assert ([len(ring) // 2 for ring in marks], nothing) == ([4], [])
+    assert bench.map.roads == BEFORE.roads

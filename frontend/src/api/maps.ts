@@ -22,6 +22,10 @@ export const mapEdits = (name: string) =>
 export const mendMap = (name: string, edits: MapEdit[], out: string) =>
   call("post", "/api/maps/{name}/edits", { params: { path: { name } }, body: { edits, out } });
 
+/** What an edit would do to a map as it is: its row, and outlines of what changes. */
+export const tryEdit = (name: string, edit: MapEdit) =>
+  call("post", "/api/maps/{name}/edits/trial", { params: { path: { name } }, body: { edit } });
+
 /** What is at a place of a map, metres. */
 export const placeAt = (name: string, x: number, y: number): Promise<PlaceInfo> =>
   call("get", "/api/maps/{name}/place", { params: { path: { name }, query: { x, y } } });

@@ -96,6 +96,13 @@ export interface paths {
          */
         post: operations["mend_map_api_maps__name__edits_post"];
     };
+    "/api/maps/{name}/edits/trial": {
+        /**
+         * Try Map Edit
+         * @description What an edit would do to a map as it is, at once; nothing is changed.
+         */
+        post: operations["try_map_edit_api_maps__name__edits_trial_post"];
+    };
     "/api/map-importers": {
         /**
          * List Map Importers
@@ -1200,6 +1207,22 @@ export interface components {
             version: string;
         };
         /**
+         * @description Lead the lane border nearest to the place, or the road, through ``to``.
+         *
+         *     ``length`` is metres of the bend along the road, the same before and behind.
+         */
+        BendEdit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "bend_border" | "bend_road";
+            to: components["schemas"]["MapPlace"];
+            /** @default 40 */
+            length?: number;
+        };
+        /**
          * @description In which direction a figure is better.
          * @enum {string}
          */
@@ -1645,14 +1668,17 @@ export interface components {
             passed: boolean;
             time: number | null;
         };
-        /** @description Add a crosswalk over the carriageway, ``width`` metres along the road, or remove it. */
+        /** @description Add a crosswalk over the carriageway, ``width`` metres along the road, remove or move it. */
         CrosswalkEdit: {
             at: components["schemas"]["MapPlace"];
+            /** @default 0 */
+            by?: number;
+            to?: components["schemas"]["MapPlace"] | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
-            kind: "add_crosswalk" | "remove_crosswalk";
+            kind: "add_crosswalk" | "move_crosswalk" | "remove_crosswalk";
             /** @default 4 */
             width?: number;
         };
@@ -2054,6 +2080,15 @@ export interface components {
             version: number;
             edits: (components["schemas"]["AddActorEdit"] | components["schemas"]["MoveActorEdit"] | components["schemas"]["SetGoalEdit"] | components["schemas"]["ChangeActorEdit"] | components["schemas"]["RemoveActorsEdit"] | components["schemas"]["CopyActorsEdit"] | components["schemas"]["FillRoiEdit"] | components["schemas"]["SetEgoEdit"] | components["schemas"]["SetClockEdit"] | components["schemas"]["SetRoutesEdit"] | components["schemas"]["SetParkingEdit"] | components["schemas"]["SetZoneEdit"] | components["schemas"]["SetProfileEdit"] | components["schemas"]["SetInputEdit"] | components["schemas"]["SetMatrixEdit"] | components["schemas"]["SetCountsEdit"] | components["schemas"]["SetBackgroundEdit"] | components["schemas"]["RemoveDemandEdit"] | components["schemas"]["SetStopEdit"] | components["schemas"]["SetLineEdit"] | components["schemas"]["RemoveTransitEdit"] | components["schemas"]["AddFlowEdit"] | components["schemas"]["ChangeFlowEdit"] | components["schemas"]["RemoveFlowEdit"] | components["schemas"]["SetGroupEdit"] | components["schemas"]["RemoveGroupEdit"] | components["schemas"]["AddStageEdit"] | components["schemas"]["RemoveStageEdit"] | components["schemas"]["SetIntergreenEdit"] | components["schemas"]["SetDetectorEdit"] | components["schemas"]["RemoveDetectorEdit"] | components["schemas"]["SetPlanEdit"] | components["schemas"]["RemovePlanEdit"] | components["schemas"]["GrowRoiEdit"] | components["schemas"]["ExtendRoiEdit"] | components["schemas"]["ShrinkRoiEdit"] | components["schemas"]["SetRuleEdit"] | components["schemas"]["RemoveRuleEdit"] | components["schemas"]["SetMeasureEdit"] | components["schemas"]["RemoveMeasureEdit"] | components["schemas"]["SetParameterEdit"] | components["schemas"]["RemoveParameterEdit"] | components["schemas"]["SetFormulaEdit"] | components["schemas"]["SetStudyEdit"] | components["schemas"]["RenameEdit"] | components["schemas"]["SetSeedEdit"] | components["schemas"]["SetCriteriaEdit"] | components["schemas"]["SetSimulationEdit"] | components["schemas"]["SetEnvironmentEdit"] | components["schemas"]["SetDriversEdit"] | components["schemas"]["SetSignalControlEdit"] | components["schemas"]["SetTimingEdit"] | components["schemas"]["ClearTimingEdit"] | components["schemas"]["SetGreenEdit"] | components["schemas"]["SetOffsetEdit"] | components["schemas"]["SetStageEdit"] | components["schemas"]["SetTurnEdit"])[];
             label?: string | null;
+        };
+        /** @description What an edit would do: its row, and outlines of what changes, x and y in turn, metres. */
+        EditTrial: {
+            row: components["schemas"]["ConversionEntry"];
+            outlines: number[][];
+        };
+        /** @description An edit to be tried. */
+        EditTrialRequest: {
+            edit: components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["ObjectEdit"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"] | components["schemas"]["BendEdit"] | components["schemas"]["RoadEndEdit"] | components["schemas"]["JoinJunctions"];
         };
         /**
          * @description What became of a vehicle under test; seconds, m/s.
@@ -2575,6 +2610,16 @@ export interface components {
         JobStarted: {
             job: string;
         };
+        /** @description Make one junction of that at the place, that at ``to`` and the roads between them. */
+        JoinJunctions: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "join_junctions";
+            to: components["schemas"]["MapPlace"];
+        };
         JsonPart: unknown;
         /**
          * @description The traffic light of one junction, where it differs from the map's program.
@@ -2824,12 +2869,12 @@ export interface components {
         };
         /** @description All edits of a map, in place of those that it has; ``out`` is the map that gets them. */
         MapEdits: {
-            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
+            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["ObjectEdit"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"] | components["schemas"]["BendEdit"] | components["schemas"]["RoadEndEdit"] | components["schemas"]["JoinJunctions"])[];
             out?: string | null;
         };
         /** @description Edits of a map in their order, and what became of each; the row of edit n has number n. */
         MapEditsInfo: {
-            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"])[];
+            edits: (components["schemas"]["LaneWidth"] | components["schemas"]["LaneLimit"] | components["schemas"]["LaneAccess"] | components["schemas"]["RoadMarkEdit"] | components["schemas"]["StopLineEdit"] | components["schemas"]["CrosswalkEdit"] | components["schemas"]["AddIsland"] | components["schemas"]["ObjectEdit"] | components["schemas"]["SignalEdit"] | components["schemas"]["AddSign"] | components["schemas"]["AddLight"] | components["schemas"]["TurnEdit"] | components["schemas"]["BendEdit"] | components["schemas"]["RoadEndEdit"] | components["schemas"]["JoinJunctions"])[];
             rows: components["schemas"]["ConversionEntry"][];
         };
         /** @description The map's version of OpenDRIVE, and on which side is driven: RHT, LHT or mixed. */
@@ -3073,6 +3118,18 @@ export interface components {
             low: number;
             high: number;
         };
+        /** @description Remove the island or other object (tree, pole, building) nearest to the place, or move it. */
+        ObjectEdit: {
+            at: components["schemas"]["MapPlace"];
+            /** @default 0 */
+            by?: number;
+            to?: components["schemas"]["MapPlace"] | null;
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "move_island" | "move_object" | "remove_island" | "remove_object";
+        };
         /** @description What is asked for holds for this version only. */
         OfVersion: {
             version: number;
@@ -3291,7 +3348,7 @@ export interface components {
             limit: number | null;
             hdg: number;
             ring: number[];
-            parts: ("stop_line" | "crosswalk" | "light" | "sign")[];
+            parts: ("stop_line" | "crosswalk" | "light" | "sign" | "island" | "object")[];
         };
         /**
          * @description Planned motion: rows ``first[i]`` up to ``first[i + 1]`` belong to ``users[i]``.
@@ -3794,6 +3851,16 @@ export interface components {
              * @enum {string}
              */
             destinations: "leave" | "end" | "wait";
+        };
+        /** @description Move the end of a road nearest to the place as far as ``to`` is from the place. */
+        RoadEndEdit: {
+            at: components["schemas"]["MapPlace"];
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "move_road_end";
+            to: components["schemas"]["MapPlace"];
         };
         /** @description Paint the border that is nearest to the place: ``solid``, ``broken``, ``none``, ... */
         RoadMarkEdit: {
@@ -4924,16 +4991,21 @@ export interface components {
             /** @default 3 */
             gap: number;
         };
-        /** @description Remove the light or sign nearest to the place, or move it ``by`` metres along its road. */
+        /**
+         * @description Remove the light or sign nearest to the place, or move it.
+         *
+         *     It is moved ``to`` a place beside its road, or ``by`` metres along it.
+         */
         SignalEdit: {
             at: components["schemas"]["MapPlace"];
+            /** @default 0 */
+            by?: number;
+            to?: components["schemas"]["MapPlace"] | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "move_light" | "move_sign" | "remove_light" | "remove_sign";
-            /** @default 0 */
-            by?: number;
         };
         /**
          * @description A light or sign; metres, ``value`` of a speed limit in m/s.
@@ -5196,17 +5268,18 @@ export interface components {
         /**
          * @description Add a stop line for the lanes of the direction there, remove the nearest or move it.
          *
-         *     ``by`` is metres in the direction of driving.
+         *     It is moved ``to`` a place on its road, or ``by`` metres in the direction of driving.
          */
         StopLineEdit: {
             at: components["schemas"]["MapPlace"];
+            /** @default 0 */
+            by?: number;
+            to?: components["schemas"]["MapPlace"] | null;
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "add_stop_line" | "move_stop_line" | "remove_stop_line";
-            /** @default 0 */
-            by?: number;
         };
         /** @description A stop line from end to end. */
         StopLineInfo: {
@@ -6183,6 +6256,27 @@ export interface operations {
             202: {
                 content: {
                     "application/json": components["schemas"]["JobStarted"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    try_map_edit_api_maps__name__edits_trial_post: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["EditTrialRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["EditTrial"];
                 };
             };
             default: components["responses"]["Error"];

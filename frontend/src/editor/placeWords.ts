@@ -63,4 +63,6 @@ const KIND = localized((): Record<string, string> => ({
   sidewalk: t`Sidewalk`,
   walking: t`Sidewalk`,
   parking: t`Parking lane`,
+  shoulder: t`Shoulder`,
+  restricted: t`Closed lane`,
 }));

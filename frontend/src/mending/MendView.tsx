@@ -1,4 +1,4 @@
-import { Alert, Button, Group, Loader, NumberInput, Text, Title } from "@mantine/core";
+import { Alert, Button, Group, Loader, NumberInput, Select, Text, Title } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
@@ -6,7 +6,7 @@ import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import "../exchange/exchange.css";
 
 import { api } from "../api/client";
-import { followJob, type MapEdit, mapEdits, mendMap, placeAt, type PlaceInfo } from "../api/maps";
+import { followJob, type MapEdit, mapEdits, mendMap, placeAt, type PlaceInfo, tryEdit } from "../api/maps";
 import type { ConversionReport } from "../api/types";
 import { lengthText, toShown, fromShown, unitFor } from "../language/units";
 import { laneKind } from "../editor/placeWords";
@@ -20,8 +20,9 @@ import { IconRedo, IconUndo } from "../ui/icons";
 import { tellError } from "../ui/notices";
 import { useLoaded } from "../ui/useLoaded";
 import { type Placing, PictureForm } from "./PictureForm";
-import { editWords, partWords } from "./words";
+import { type Aim, aimWords, editWords, laneTypes, markWords, partWords, signWords } from "./words";
 
+type Mark = Extract<MapEdit, { kind: "road_mark" }>["mark"];
 type Row = ConversionReport["entries"][number];
 
 interface Whole {
@@ -82,14 +83,15 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
   const { edits, rows, drawing, loaded } = whole;
   const unfit = rows.map((entry) => (entry.fate === "lost" ? entry.reason : null));
   const [chosen, setChosen] = useState<Chosen | null>(null);
-  const [turning, setTurning] = useState<"add_turn" | "remove_turn" | null>(null);
+  const [aiming, setAiming] = useState<Aim | null>(null);
+  const [shown, setShown] = useState<number[][]>([]);
   const [undone, setUndone] = useState<MapEdit[]>([]);
   const [working, setWorking] = useState(false);
   const [placing, setPlacing] = useState<Placing | null>(null);
 
   const send = async (next: MapEdit[], left: MapEdit[]): Promise<void> => {
     setWorking(true);
-    setTurning(null);
+    setAiming(null);
     try {
       // Scenarios of a map that has no edits yet are not to lose it: its copy is mended.
       const out = edits.length === 0 && undone.length === 0 ? await copyName(map) : map;
@@ -122,16 +124,34 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
   useEffect(() => {
     if (latest.current) void look(latest.current.x, latest.current.y);
   }, [whole, look]);
-  const add = (edit: MapEdit): void => void send([...edits, edit], []);
+  // What does not fit is said at once, and what changes shown before the map is built anew.
+  const add = async (edit: MapEdit): Promise<void> => {
+    setAiming(null);
+    setWorking(true);
+    try {
+      const { row, outlines } = await tryEdit(map, edit);
+      if (row.fate === "lost") {
+        tellError(new Error(served(row.reason)));
+        return;
+      }
+      setShown(outlines);
+      await send([...edits, edit], []);
+    } catch (error) {
+      tellError(error);
+    } finally {
+      setShown([]);
+      setWorking(false);
+    }
+  };
   const undo = (): void => void send(edits.slice(0, -1), [...edits.slice(-1), ...undone]);
   const redo = (): void => void send([...edits, ...undone.slice(0, 1)], undone.slice(1));
   const pick = (at: Pointed): void => {
     if (placing) {
       placing.onMap(at.x, at.y);
-    } else if (turning && chosen) {
+    } else if (aiming && chosen) {
       if (working) return;
       const { x, y, info } = chosen;
-      add({ kind: turning, at: { x, y, hdg: info.hdg }, to: { x: at.x, y: at.y } });
+      void add({ kind: aiming, at: { x, y, hdg: info.hdg }, to: { x: at.x, y: at.y } } as MapEdit);
     } else {
       // Nothing is changed at the place before while this one is asked for.
       setChosen(null);
@@ -142,13 +162,13 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
     () => ({
       ...EMPTY_SCENE,
       nodes: { vehicles: false, walks: false, inside: null },
-      lanes: chosen ? [new Float64Array(chosen.info.ring)] : [],
+      lanes: [...(chosen ? [chosen.info.ring] : []), ...shown].map((ring) => new Float64Array(ring)),
       pins: [
         ...(chosen ? [{ x: chosen.x, y: chosen.y, sign: "+", text: lengthText(chosen.info.width, 2) }] : []),
         ...(placing?.pins ?? []),
       ],
     }),
-    [chosen, placing],
+    [chosen, placing, shown],
   );
   return (
     <div
@@ -200,10 +220,10 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
             </Group>
           )}
         </div>
-        {turning && (
+        {aiming && (
           <Alert mb="sm">
-            <Trans>Choose the lane behind the junction on the map.</Trans>{" "}
-            <Button size="compact-sm" variant="white" onClick={() => setTurning(null)}>
+            {aimWords(aiming)}{" "}
+            <Button size="compact-sm" variant="white" onClick={() => setAiming(null)}>
               <Trans>Cancel</Trans>
             </Button>
           </Alert>
@@ -213,8 +233,8 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
             key={`${chosen.x} ${chosen.y} ${chosen.info.width} ${chosen.info.limit}`}
             chosen={chosen}
             working={working}
-            onAdd={add}
-            onTurn={setTurning}
+            onAdd={(edit) => void add(edit)}
+            onAim={setAiming}
           />
         ) : (
           <Text c="dimmed">
@@ -266,12 +286,12 @@ function PlaceForm({
   chosen: { x, y, info },
   working,
   onAdd,
-  onTurn,
+  onAim,
 }: {
   chosen: Chosen;
   working: boolean;
   onAdd: (edit: MapEdit) => void;
-  onTurn: (kind: "add_turn" | "remove_turn") => void;
+  onAim: (kind: Aim) => void;
 }) {
   const [width, setWidth] = useState<string | number>(Number(toShown(info.width, "length").toFixed(2)));
   const limited = info.limit === null ? "" : Math.round(toShown(info.limit / 3.6, "speed"));
@@ -282,12 +302,30 @@ function PlaceForm({
       {label}
     </Button>
   );
+  // A limit has the number that is entered above, else the usual one of a town.
+  const signEdit = (type: string): MapEdit =>
+    type === "274"
+      ? {
+          kind: "add_sign",
+          at,
+          type,
+          value: Math.round(limit === "" ? 50 : fromShown(Number(limit), "speed") * 3.6),
+          unit: "km/h",
+        }
+      : { kind: "add_sign", at, type };
   const removals: Record<PlaceInfo["parts"][number], MapEdit> = {
     stop_line: { kind: "remove_stop_line", at: { x, y } },
     crosswalk: { kind: "remove_crosswalk", at: { x, y } },
     light: { kind: "remove_light", at: { x, y } },
     sign: { kind: "remove_sign", at: { x, y } },
+    island: { kind: "remove_island", at: { x, y } },
+    object: { kind: "remove_object", at: { x, y } },
   };
+  const aim = (label: string, kind: Aim) => (
+    <Button key={label} size="compact-sm" variant="default" disabled={working} onClick={() => onAim(kind)}>
+      {label}
+    </Button>
+  );
   return (
     <>
       <Title order={2} size="h5">
@@ -347,12 +385,46 @@ function PlaceForm({
         {button(t`Add stop line`, { kind: "add_stop_line", at })}
         {button(t`Add traffic light`, { kind: "add_light", at })}
         {button(t`Add island`, { kind: "add_island", at })}
-        <Button size="compact-sm" variant="default" disabled={working} onClick={() => onTurn("add_turn")}>
-          <Trans>Add turn …</Trans>
-        </Button>
-        <Button size="compact-sm" variant="default" disabled={working} onClick={() => onTurn("remove_turn")}>
-          <Trans>Remove turn …</Trans>
-        </Button>
+        {aim(t`Add turn …`, "add_turn")}
+        {aim(t`Remove turn …`, "remove_turn")}
+      </Group>
+      <Group gap={6} mt={6} role="group" aria-label={t`Move and bend`}>
+        {aim(t`Bend lane border …`, "bend_border")}
+        {aim(t`Bend road …`, "bend_road")}
+        {aim(t`Move end of road …`, "move_road_end")}
+        {aim(t`Join junctions …`, "join_junctions")}
+        {info.parts.map((part) => aim(t`Move ${partWords()[part]} …`, `move_${part}`))}
+      </Group>
+      <Group gap={6} mt={6} mb="sm" align="end" role="group" aria-label={t`Sign, use and road mark`}>
+        <Select
+          label={t`Add sign`}
+          placeholder={t`Choose`}
+          w={150}
+          value={null}
+          disabled={working}
+          data={Object.entries(signWords()).map(([value, label]) => ({ value, label }))}
+          onChange={(type) => type && onAdd(signEdit(type))}
+        />
+        <Select
+          label={t`Lane for`}
+          w={150}
+          value={info.type}
+          disabled={working}
+          data={[...new Set([info.type, ...laneTypes])].map((type) => ({
+            value: type,
+            label: laneKind(type),
+          }))}
+          onChange={(type) => type && type !== info.type && onAdd({ kind: "access", at, type })}
+        />
+        <Select
+          label={t`Road mark of the nearest border`}
+          placeholder={t`Choose`}
+          w={230}
+          value={null}
+          disabled={working}
+          data={Object.entries(markWords()).map(([value, label]) => ({ value, label }))}
+          onChange={(mark) => mark && onAdd({ kind: "road_mark", at, mark: mark as Mark })}
+        />
       </Group>
     </>
   );

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -42,6 +43,8 @@ _STOP_LINE = 0.4
 """Metres of a stop line along the road."""
 _STANDING = 0.6
 """Metres from the carriageway to a pole."""
+_SHOWN_SIGNAL = 0.4
+"""Metres to each side of a light or sign by which it is shown."""
 _LEAST_WIDTH = 0.3
 """Metres that a lane keeps beside a border that is bent."""
 _LEAST_BEND = 2.0
@@ -136,6 +139,55 @@ class EditedMap:
         self._taken |= {item.id for road in roads for item in road.signals}
         self._taken |= set(before.controllers)
         self._numbers = iter(range(9_000_000, 10_000_000))
+
+    def copy(self) -> EditedMap:
+        """The map as it is by now, to be edited without changing this one."""
+        self.table  # noqa: B018  # once for all copies
+        twin = copy(self)
+        twin.map = replace(
+            self.map,
+            roads=dict(self.map.roads),
+            junctions=dict(self.map.junctions),
+            controllers=dict(self.map.controllers),
+        )
+        twin._taken = set(self._taken)
+        twin._numbers = iter(range(9_000_000, 10_000_000))
+        return twin
+
+    def outline_changes(self, before: EditedMap) -> list[tuple[float, ...]]:
+        """Outlines of what is other than on a map before: x and y in turn, metres.
+
+        Lanes of the roads whose lanes or line have changed, objects and signals.
+        """
+        changed = {
+            key: road
+            for key, road in self.map.roads.items()
+            if road is not before.map.roads.get(key)
+        }
+        if not changed:
+            return []
+        table = RoadTable.of(replace(self.map, roads=changed, junctions={}))
+        rings = []
+        for road in changed.values():
+            old = before.map.roads.get(road.id)
+            row = table.road_index[road.id]
+            if old is None or (road.geometry, road.lane_offset, road.sections) != (
+                old.geometry, old.lane_offset, old.sections
+            ):  # fmt: skip
+                lanes = np.flatnonzero(table.lane_road == row).tolist()
+                rings += [_outline_lane(table, lane) for lane in lanes]
+            known = () if old is None else (*old.objects, *old.signals)
+            for item in road.objects:
+                if item not in known:
+                    outlines = object_outline(table, road.id, item)
+                    rings += [tuple(ring[:, :2].ravel().tolist()) for ring in outlines[:1]]
+            for signal in road.signals:
+                if signal not in known:
+                    side = np.array([-_SHOWN_SIGNAL, _SHOWN_SIGNAL])
+                    s, t = np.repeat(signal.s + side, 2), signal.t + side[[0, 1, 1, 0]]
+                    x, y, _ = table.points(np.full(4, row), s, t)
+                    rings.append(tuple(np.stack([x, y], axis=1).ravel().tolist()))
+        return rings
 
     @property
     def table(self) -> RoadTable:
@@ -296,10 +348,6 @@ class EditedMap:
         lane = np.array([found.row])
         here = self.table.lane_points(lane, np.array([found.s]))
         speed = float(self.table.speed_limit(lane, np.array([found.s]))[0])
-        s0, s1 = float(self.table.lane_s0[found.row]), float(self.table.lane_s1[found.row])
-        s = np.linspace(s0, s1, max(2, math.ceil((s1 - s0) / 2.0) + 1))
-        sides = [self.table.lane_points(np.full(s.size, found.row), s, at=at) for at in (0.0, 1.0)]
-        left, right = (np.stack([side.x, side.y], axis=1).round(3).tolist() for side in sides)
         turn = 0.0 if self.table.lane_forward[found.row] else math.pi
         parts = []
         for kind in ("stop line", "crosswalk", "light", "sign", "island", "object"):
@@ -317,7 +365,7 @@ class EditedMap:
             width=round(float(here.width[0]), 3),
             limit=round(speed * 3.6, 3) if math.isfinite(speed) else None,
             hdg=math.remainder(float(here.hdg[0]) + turn, 2.0 * math.pi),
-            ring=tuple(value for point in [*left, *right[::-1]] for value in point),
+            ring=_outline_lane(self.table, found.row),
             parts=tuple(parts),
         )
 
@@ -515,15 +563,13 @@ class EditedMap:
         return _lane_path(key), f"road mark {mark}, lane change {change}"
 
     # ------------------------------------------------------------------ shapes
-    def _station_on(
-        self, road: RoadId, xy: tuple[float, float], what: str = "second place"
-    ) -> tuple[float, float]:
+    def _station_on(self, road: RoadId, xy: tuple[float, float]) -> tuple[float, float]:
         """S and t of a place on a certain road."""
         row = self.table.road_index[road]
         for near, s, t in self._roads_near(*xy):
             if near == row:
                 return s, t
-        raise EditRefusedError(f"the {what} is not beside road {road}")
+        raise EditRefusedError(f"the second place is not beside road {road}")
 
     def bend_border(
         self, xy: tuple[float, float], hdg: float | None, to: tuple[float, float], length: float
@@ -613,8 +659,10 @@ class EditedMap:
         hdg = float(line.hdg[0])
         shift = Displacement(-by * math.sin(hdg), by * math.cos(hdg), begin, s, end)
         self._set_reshaped([reshape_road(road, self.table, shift)])
-        side = "left" if by > 0 else "right"
-        return f"road {road.id}", f"led {abs(by):.2f} m to the {side} at s {s:.1f} m"
+        return (
+            f"road {road.id}",
+            f"led {abs(by):.2f} m to the {'left' if by > 0 else 'right'} at s {s:.1f} m",
+        )
 
     def _set_reshaped(self, reshaped: Sequence[tuple[model.Road, float]]) -> None:
         """Take roads with another line, if none is too tight to drive."""
@@ -667,8 +715,11 @@ class EditedMap:
                 if ends != [still, still]:
                     reshaped.append(redraw_road(other, self.table, *ends))
         self._set_reshaped(reshaped)
-        rest = f", with {len(reshaped) - 1} roads" if len(reshaped) > 1 else ""
-        return f"road {road.id}", f"{contact} moved by {math.hypot(*by):.2f} m{rest}"
+        return (
+            f"road {road.id}",
+            f"{contact} moved by {math.hypot(*by):.2f} m; roads that follow it: "
+            f"{len(reshaped) - 1}",
+        )
 
     def _move_end(
         self, road: model.Road, contact: str, by: tuple[float, float]
@@ -933,12 +984,11 @@ class EditedMap:
         }
         self.map = replace(self.map, roads=roads, junctions=junctions)
         self._table = self._points = self._outlines = None
-        parts = [
-            f"{len(joined.turns)} turns in place of {_count(len(between), 'road')}",
-            *([_count(len(joined.signals), "signal")] if joined.signals else []),
-            *([_count(joined.crosswalks, "crosswalk")] if joined.crosswalks else []),
-        ]
-        return f"junction {first}", f"joined with junction {second}: {', '.join(parts)}"
+        return (
+            f"junction {first}",
+            f"joined with junction {second}; turns drawn: {len(joined.turns)}, signals removed: "
+            f"{len(joined.signals)}, crosswalks removed: {joined.crosswalks}",
+        )
 
     # ------------------------------------------------------------------ turns
     def _through(self, start: FoundLane, end: FoundLane) -> tuple[JunctionId, list[LaneKey]]:
@@ -1098,6 +1148,15 @@ def _lane_path(key: LaneKey) -> str:
     return f"road {key.road} > laneSection {key.section} > lane {key.lane}"
 
 
+def _outline_lane(table: RoadTable, lane: int) -> tuple[float, ...]:
+    """A lane from begin to end of its section: x and y in turn, metres."""
+    s0, s1 = float(table.lane_s0[lane]), float(table.lane_s1[lane])
+    s = np.linspace(s0, s1, max(2, math.ceil((s1 - s0) / 2.0) + 1))
+    sides = [table.lane_points(np.full(s.size, lane), s, at=at) for at in (0.0, 1.0)]
+    left, right = (np.stack([side.x, side.y], axis=1).round(3) for side in sides)
+    return tuple(np.concatenate([left, right[::-1]]).ravel().tolist())
+
+
 def _kind_of(item: model.RoadObject) -> ObjectKind:
     if is_stop_line(item):
         return "stop line"
@@ -1119,10 +1178,6 @@ def _values_of(profile: Sequence[model.Cubic], s: FloatArray) -> list[float]:
         h = at - start
         values.append(a + h * (b + h * (c + h * d)))
     return values
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _say_moved(s: float, t: float, to_s: float, to_t: float) -> str:

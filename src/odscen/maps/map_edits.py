@@ -425,16 +425,31 @@ def mend_map(xodr: bytes, edits: Sequence[MapEdit], *, file: str = "") -> Mended
     bench = EditedMap(before)
     rows, kept = [], []
     for number, edit in enumerate(edits, 1):
-        name = f"edit {number} ({edit.kind})"
-        try:
-            xy = bench.place_of(edit.at)
-            element, done = edit.apply(bench, xy)
-        except EditRefusedError as error:
-            rows.append(ReportEntry(ElementOutcome.LOST, name, str(error), source_id=name))
-        else:
-            rows.append(ReportEntry(ElementOutcome.REPAIRED, element, done, 1.0, name))
+        rows.append(_apply_edit(bench, edit, f"edit {number} ({edit.kind})"))
         kept.append(_with_degrees(edit, bench))
     return MendedMap(rewrite_opendrive(xodr, before, bench.map), edits_text(kept), tuple(rows))
+
+
+def try_edit(bench: EditedMap, edit: MapEdit) -> tuple[ReportEntry, list[tuple[float, ...]]]:
+    """What an edit would do to a map, which stays as it is.
+
+    Returns
+    -------
+    ReportEntry, list[tuple[float, ...]]
+        Its row, and outlines of what would change: x and y in turn, metres.
+    """
+    trial = bench.copy()
+    row = _apply_edit(trial, edit, edit.kind)
+    return row, trial.outline_changes(bench)
+
+
+def _apply_edit(bench: EditedMap, edit: MapEdit, name: str) -> ReportEntry:
+    try:
+        xy = bench.place_of(edit.at)
+        element, done = edit.apply(bench, xy)
+    except EditRefusedError as error:
+        return ReportEntry(ElementOutcome.LOST, name, str(error), source_id=name)
+    return ReportEntry(ElementOutcome.REPAIRED, element, done, 1.0, name)
 
 
 def _with_degrees(edit: MapEdit, bench: EditedMap) -> MapEdit:

@@ -23,7 +23,7 @@ from odscen.maps.edited_map import EditRefusedError
 from odscen.maps.folder_names import check_name, name_from_file
 from odscen.maps.importers.base import ImportSettings
 from odscen.maps.importers.registry import map_importers
-from odscen.maps.map_edits import read_edits
+from odscen.maps.map_edits import read_edits, try_edit
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import is_outdated
 from odscen.maps.traffic_losses import traffic_losses
@@ -45,6 +45,8 @@ from odscen.web.wire.map_messages import (
     ConversionEntry,
     ConversionInfo,
     DrawingColumns,
+    EditTrial,
+    EditTrialRequest,
     GraphColumns,
     GraphCounts,
     HeightColumns,
@@ -154,6 +156,13 @@ def show_edits(name: str, shared: Shared) -> MapEditsInfo:
     entry = shared.workspace.map(name)
     rows = [ConversionEntry.model_validate(row) for row in entry.edit_rows()]
     return MapEditsInfo(edits=read_edits(entry.importing.edits or "[]"), rows=rows)
+
+
+@router.post("/maps/{name}/edits/trial")
+def try_map_edit(name: str, body: EditTrialRequest, shared: Shared) -> EditTrial:
+    """What an edit would do to a map as it is, at once; nothing is changed."""
+    row, outlines = try_edit(map_to_mend(shared.workspace.map(name)), body.edit)
+    return EditTrial.model_validate({"row": row.to_dict(), "outlines": outlines})
 
 
 @router.post("/maps/{name}/edits", status_code=202)

@@ -230,6 +230,19 @@ class MapEditsInfo(Answer):
     rows: list[ConversionEntry]
 
 
+class EditTrialRequest(RequestBody):
+    """An edit to be tried."""
+
+    edit: MapEdit
+
+
+class EditTrial(Answer):
+    """What an edit would do: its row, and outlines of what changes, x and y in turn, metres."""
+
+    row: ConversionEntry
+    outlines: list[list[float]]
+
+
 class ConversionInfo(Answer):
     """What became of all elements on the way to SUMO; figures of ``docs/sumo-network.md``."""
 
