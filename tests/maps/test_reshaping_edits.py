@@ -194,7 +194,7 @@ def test_two_junctions_are_joined_and_each_way_through_both_becomes_a_turn() -> 
         now = {key for through in still[start] for key in still[through]}
         assert reached <= now
     far = mend_map(TOWN, check_edits([joining(before, "53")]))
-    assert done_rows(far.entries)[0][1].endswith("m are between the junctions, more than 80 m")
+    assert done_rows(far.entries)[0][1].endswith("m are between the junctions, more than 100 m")
     same = mend_map(TOWN, check_edits([{**edit, "to": edit["at"]}]))
     assert done_rows(same.entries) == [("lost", "both places are at junction 10008")]
 

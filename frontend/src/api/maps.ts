@@ -22,6 +22,10 @@ export const mapEdits = (name: string) =>
 export const mendMap = (name: string, edits: MapEdit[], out: string) =>
   call("post", "/api/maps/{name}/edits", { params: { path: { name } }, body: { edits, out } });
 
+/** Imports a newer file of the same place with the edits of a map; the server's job. */
+export const renewMap = (name: string, file: File, out: string) =>
+  call("post", "/api/maps/{name}/file", { params: { path: { name } }, body: form({ file, out }) });
+
 /** What an edit would do to a map as it is: its row, and outlines of what changes. */
 export const tryEdit = (name: string, edit: MapEdit) =>
   call("post", "/api/maps/{name}/edits/trial", { params: { path: { name } }, body: { edit } });

@@ -103,6 +103,13 @@ export interface paths {
          */
         post: operations["try_map_edit_api_maps__name__edits_trial_post"];
     };
+    "/api/maps/{name}/file": {
+        /**
+         * Renew Map
+         * @description Import a newer file of the same place with the edits of a map, in the background.
+         */
+        post: operations["renew_map_api_maps__name__file_post"];
+    };
     "/api/map-importers": {
         /**
          * List Map Importers
@@ -1280,6 +1287,12 @@ export interface components {
             version: number;
             /** @description Only this light. */
             junction?: string | null;
+        };
+        Body_renew_map_api_maps__name__file_post: {
+            /** @description A newer file of the same place. */
+            file: string;
+            /** @description The map that is made, if not this one. */
+            out?: string | null;
         };
         Body_set_background_api_maps__name__background_post: {
             /** @description PNG, JPEG or TIFF. */
@@ -6277,6 +6290,27 @@ export interface operations {
             200: {
                 content: {
                     "application/json": components["schemas"]["EditTrial"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    renew_map_api_maps__name__file_post: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "multipart/form-data": FormData;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                content: {
+                    "application/json": components["schemas"]["JobStarted"];
                 };
             };
             default: components["responses"]["Error"];

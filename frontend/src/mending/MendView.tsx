@@ -1,4 +1,4 @@
-import { Alert, Button, Group, Loader, NumberInput, Select, Text, Title } from "@mantine/core";
+import { Alert, Button, FileButton, Group, Loader, NumberInput, Select, Text, Title } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
@@ -6,7 +6,16 @@ import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import "../exchange/exchange.css";
 
 import { api } from "../api/client";
-import { followJob, type MapEdit, mapEdits, mendMap, placeAt, type PlaceInfo, tryEdit } from "../api/maps";
+import {
+  followJob,
+  type MapEdit,
+  mapEdits,
+  mendMap,
+  placeAt,
+  type PlaceInfo,
+  renewMap,
+  tryEdit,
+} from "../api/maps";
 import type { ConversionReport } from "../api/types";
 import { lengthText, toShown, fromShown, unitFor } from "../language/units";
 import { laneKind } from "../editor/placeWords";
@@ -89,13 +98,13 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
   const [working, setWorking] = useState(false);
   const [placing, setPlacing] = useState<Placing | null>(null);
 
-  const send = async (next: MapEdit[], left: MapEdit[]): Promise<void> => {
+  const build = async (start: (out: string) => Promise<{ job: string }>, left: MapEdit[]): Promise<void> => {
     setWorking(true);
     setAiming(null);
     try {
       // Scenarios of a map that has no edits yet are not to lose it: its copy is mended.
       const out = edits.length === 0 && undone.length === 0 ? await copyName(map) : map;
-      const { job } = await mendMap(map, next, out);
+      const { job } = await start(out);
       if (!(await followJob(job, () => undefined))) return;
       setUndone(left);
       forgetMaps();
@@ -107,6 +116,9 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
       setWorking(false);
     }
   };
+  const send = (next: MapEdit[], left: MapEdit[]): Promise<void> =>
+    build((out) => mendMap(map, next, out), left);
+  const renew = (file: File): Promise<void> => build((out) => renewMap(map, file, out), undone);
   const asked = useRef(0);
   const look = useCallback(
     async (x: number, y: number): Promise<void> => {
@@ -263,6 +275,19 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
             ))}
           </ol>
         )}
+        <Title order={2} size="h5" mt="lg">
+          <Trans>Newer file of the place</Trans>
+        </Title>
+        <Text size="sm" c="dimmed" mb={6}>
+          <Trans>It is imported in place of the one before, and all changes are made again.</Trans>
+        </Text>
+        <FileButton onChange={(file) => file && void renew(file)}>
+          {(props) => (
+            <Button size="compact-sm" variant="default" disabled={working} {...props}>
+              <Trans>Choose a newer file</Trans>
+            </Button>
+          )}
+        </FileButton>
         <PictureForm map={map} onPlacing={setPlacing} />
       </section>
       <div className="import-map">

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from odscen.maps.importers.osm.street_line import Cubic
     from odscen.opendrive.lanes import RoadTable
 
-LONGEST = 80.0
+LONGEST = 100.0
 """Metres of a road between two junctions that are joined."""
 _STEP = 2.0
 """Metres between the places by which a line is drawn anew."""

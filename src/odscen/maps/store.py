@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.atomic_folders import clear_leftovers, discard, new_folder
@@ -39,7 +40,6 @@ from odscen.simulators.assets import assets_in
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
-    from pathlib import Path
 
     from odscen.base.given_files import GivenPath
     from odscen.maps.allowances import BuildLimits
@@ -444,10 +444,68 @@ class Workspace:
             limits=limits,
             progress=progress,
         )
+        self._copy_background(name, out)
+        return mended
+
+    def renew_map(
+        self,
+        name: str,
+        content: bytes,
+        *,
+        file: str,
+        out: str | None = None,
+        limits: BuildLimits = BY_SIZE,
+        progress: ProgressCallback | None = None,
+    ) -> MapEntry:
+        """Import a newer file of the same place, with the edits that a map has.
+
+        The import report says of each edit whether it still fits. Options of the importer stay
+        where the file ends as the one before; a network that was brought in does not.
+
+        Parameters
+        ----------
+        name
+            Of the map.
+        content, file
+            The newer file, and its name.
+        out
+            Name of the map that is made; the map itself is replaced if not given.
+
+        Raises
+        ------
+        NotFoundError
+            If there is no such map.
+        InputError
+            If the file is refused.
+        LimitError
+            If it needs more memory or time than it may have.
+        WorkspaceError
+            If the workspace cannot be written.
+        """
+        entry = self.map(name)
+        importing = entry.importing
+        if Path(file).suffix.lower() != Path(str(entry.info["source"])).suffix.lower():
+            importing = replace(DETECTED, edits=importing.edits)
+        settings = entry.conversion
+        if settings.converter == "file":
+            settings = replace(settings, converter="odscen")
+        out = name if out is None else out
+        renewed = self.add_map_content(
+            content,
+            file=file,
+            name=out,
+            settings=settings,
+            importing=replace(importing, edits=importing.edits or ""),
+            limits=limits,
+            progress=progress,
+        )
+        self._copy_background(name, out)
+        return renewed
+
+    def _copy_background(self, name: str, out: str) -> None:
         under = self.background(name)
         if under is not None and self.background(out) is None:
             write_background(self._background_folder(out), under.read(), under)
-        return mended
 
     def background(self, name: str) -> Background | None:
         """Picture under a map; ``None`` if it has none.

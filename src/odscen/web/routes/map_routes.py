@@ -223,6 +223,30 @@ def add_map(
         raise
 
 
+@router.post("/maps/{name}/file", status_code=202)
+def renew_map(
+    name: str,
+    shared: Shared,
+    file: Annotated[UploadFile, File(description="A newer file of the same place.")],
+    out: Annotated[str | None, Form(description="The map that is made, if not this one.")] = None,
+) -> JobStarted:
+    """Import a newer file of the same place with the edits of a map, in the background."""
+    shared.workspace.stored(name)
+    out = name if out is None else check_name(out)
+    given = Path(file.filename or "map.xodr")
+    suffix = given.suffix if re.fullmatch(r"\.[A-Za-z0-9]{1,16}", given.suffix) else ""
+    content = file.file.read()
+
+    def work(progress: ProgressCallback) -> JobResult:
+        progress("starting", 0.0)
+        renewed = shared.workspace.renew_map(
+            name, content, file=f"{name_from_file(given)}{suffix}", out=out, progress=progress
+        )
+        return JobResult(renewed.name)
+
+    return JobStarted(job=shared.jobs.start(work, subject=f"map {out!r}"))
+
+
 @router.get("/map-importers")
 def list_map_importers() -> list[ImporterInfo]:
     """Formats that maps can have: OpenDRIVE, and those of installed packages that can be used."""
