@@ -141,9 +141,9 @@ function Bench({ map, whole, reload }: { map: string; whole: Whole; reload: () =
     setAiming(null);
     setWorking(true);
     try {
-      const { row, outlines } = await tryEdit(map, edit);
-      if (row.fate === "lost") {
-        tellError(new Error(served(row.reason)));
+      const { row: entry, outlines } = await tryEdit(map, edit);
+      if (entry.fate === "lost") {
+        tellError(new Error(served(entry.reason)));
         return;
       }
       setShown(outlines);
