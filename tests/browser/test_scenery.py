@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -85,3 +86,46 @@ def test_arrow_keys_and_zoom_move_the_camera(
     assert np.abs(seen[0] - seen[1]).mean() > 1
     assert np.abs(seen[1] - seen[2]).mean() > 1
     assert np.abs(seen[1] - seen[3]).mean() < 1  # nearer and back
+
+
+@pytest.mark.slow
+def test_the_editor_shows_starts_and_plans_in_three_dimensions_and_places_there(
+    user: OdscenPage, sampled: str, tmp_path: Path
+) -> None:
+    user.open_editor(sampled)
+    user.step("Road users").click()
+    user.choose("View", "3D, from above")
+    stage = user.page.locator(".scenery")
+    expect(stage.locator("canvas")).to_be_visible()
+    seen = []
+
+    def look() -> np.ndarray:
+        user.page.wait_for_timeout(800)
+        seen.append(colours(stage, str(tmp_path / f"{len(seen)}.png")))
+        return seen[-1]
+
+    assert len(np.unique(look()[::7, ::7].reshape(-1, 3), axis=0)) > 20
+    user.choose("View", "3D, driver's seat")
+    assert np.abs(look() - seen[-2]).mean() > 5
+    # As the plan drives on, so does the view; rain and night are seen at once.
+    user.open_time_bar()
+    user.time_bar.get_by_role("slider", name="Planned moment").press("PageUp")
+    expect(user.page.get_by_text("each alone on the road")).to_be_visible()
+    assert np.abs(look() - seen[-2]).mean() > 2
+    user.step("Weather and time").click()
+    with user.changing():
+        times = user.page.get_by_role("radiogroup", name="Time of day")
+        times.get_by_text("Night", exact=True).click()
+    assert look().mean() < seen[-2].mean() / 2
+    user.page.reload()
+    expect(stage.locator("canvas")).to_be_visible()
+    # A click places a road user on the road that is seen there.
+    user.choose("View", "3D, from above")
+    user.step("Road users").click()
+    before = len(user.document()["actors"])
+    user.kind("Car").click()
+    with user.changing():
+        stage.click()
+    assert len(user.document()["actors"]) == before + 1
+    user.choose("View", "Plan")
+    expect(stage).to_have_count(0)

@@ -1,4 +1,5 @@
 import { Checkbox, Group, Select, Stack } from "@mantine/core";
+import type { ReactNode } from "react";
 
 import { t } from "@lingui/core/macro";
 import type { Actor, Assets, Edit } from "../api/types";
@@ -19,11 +20,14 @@ export function ActorForm({
   actor,
   driverSets,
   assets,
+  between,
   onEdit,
 }: {
   actor: Actor;
   driverSets: readonly string[];
   assets: Assets | null;
+  /** Comes after what is set most. */
+  between?: ReactNode;
   onEdit: (edit: Edit) => void;
 }) {
   const change = (fields: Partial<Actor>): void =>
@@ -35,18 +39,15 @@ export function ActorForm({
   const [length, width] = bodyOf(actor, assets);
   return (
     <Stack gap="sm">
-      <Silhouette actor={actor} length={length} width={width} />
-      <Select
-        label={t`Model`}
-        searchable
-        clearable
-        placeholder={t`Any`}
-        data={models}
-        value={actor.model}
-        nothingFoundMessage={t`No such model`}
-        clearButtonProps={{ "aria-label": t`Any model` }}
-        onChange={(model) => change({ model })}
-      />
+      {!walks && (
+        <Checkbox
+          label={t`Ego: my vehicle under test`}
+          checked={actor.ego}
+          onChange={(event) =>
+            onEdit({ kind: "set_ego", actor: event.currentTarget.checked ? actor.id : null })
+          }
+        />
+      )}
       <Group grow align="flex-start">
         <Committed
           label={walks ? t`Walking speed` : t`Desired speed`}
@@ -66,6 +67,31 @@ export function ActorForm({
           onCommit={(value) => change({ depart: value ?? 0 })}
         />
       </Group>
+      {!walks && (
+        <Committed
+          label={t`Speed at departure`}
+          suffix={" km/h"}
+          min={0}
+          max={250}
+          digits={1}
+          placeholder={t`from rest`}
+          value={actor.initial_speed === null ? "" : actor.initial_speed * 3.6}
+          onCommit={(value) => change({ initial_speed: value === null ? null : value / 3.6 })}
+        />
+      )}
+      {between}
+      <Silhouette actor={actor} length={length} width={width} />
+      <Select
+        label={t`Model`}
+        searchable
+        clearable
+        placeholder={t`Any`}
+        data={models}
+        value={actor.model}
+        nothingFoundMessage={t`No such model`}
+        clearButtonProps={{ "aria-label": t`Any model` }}
+        onChange={(model) => change({ model })}
+      />
       {!walks && (
         <Group grow align="flex-start">
           <Committed
@@ -124,18 +150,6 @@ export function ActorForm({
         </Group>
       )}
       {!walks && (
-        <Committed
-          label={t`Speed at departure`}
-          suffix={" km/h"}
-          min={0}
-          max={250}
-          digits={1}
-          placeholder={t`from rest`}
-          value={actor.initial_speed === null ? "" : actor.initial_speed * 3.6}
-          onCommit={(value) => change({ initial_speed: value === null ? null : value / 3.6 })}
-        />
-      )}
-      {!walks && (
         <Select
           label={t`Driven by`}
           description={
@@ -147,15 +161,6 @@ export function ActorForm({
           onChange={(driver) => {
             if (driver === "sumo" || driver === "story") change({ driver });
           }}
-        />
-      )}
-      {!walks && (
-        <Checkbox
-          label={t`Ego: my vehicle under test`}
-          checked={actor.ego}
-          onChange={(event) =>
-            onEdit({ kind: "set_ego", actor: event.currentTarget.checked ? actor.id : null })
-          }
         />
       )}
       {walks && (

@@ -54,6 +54,22 @@ export function ActorStep(props: Props) {
   // A form takes longer to make than all else: it follows what map and table show already.
   const before = useDeferredValue(one);
   const formed = before?.id === one?.id ? one : before;
+  const itinerary = one && (
+    <StartAndGoal
+      one={one}
+      graph={graph}
+      starts={starts}
+      goals={goals}
+      onPickGoal={() => {
+        props.onShowGoals();
+        onTool(goalTool(one.id));
+      }}
+      onStart={(spawn) => props.onStart(one, spawn)}
+      onGoal={(goal) => props.onGoal(one, goal)}
+      onPickVia={() => onTool(waypointTool(one.id))}
+      onVia={(via) => onEdit({ kind: "change_actor", actor: one.id, via })}
+    />
+  );
   const actors = selected.filter((each): each is Actor => !isFlow(each));
   return (
     <>
@@ -115,32 +131,20 @@ export function ActorStep(props: Props) {
               <Trans>Clear selection</Trans>
             </Button>
           </Group>
-          {one && (
-            <StartAndGoal
-              one={one}
-              graph={graph}
-              starts={starts}
-              goals={goals}
-              onPickGoal={() => {
-                props.onShowGoals();
-                onTool(goalTool(one.id));
-              }}
-              onStart={(spawn) => props.onStart(one, spawn)}
-              onGoal={(goal) => props.onGoal(one, goal)}
-              onPickVia={() => onTool(waypointTool(one.id))}
-              onVia={(via) => onEdit({ kind: "change_actor", actor: one.id, via })}
-            />
-          )}
           {one &&
             formed &&
             (isFlow(formed) ? (
-              <FlowForm key={formed.id} flow={formed} profiles={props.profiles} onEdit={onEdit} />
+              <>
+                {itinerary}
+                <FlowForm key={formed.id} flow={formed} profiles={props.profiles} onEdit={onEdit} />
+              </>
             ) : (
               <ActorForm
                 key={formed.id}
                 actor={formed}
                 driverSets={props.driverSets}
                 assets={assets}
+                between={itinerary}
                 onEdit={onEdit}
               />
             ))}

@@ -5,6 +5,7 @@ import { useState } from "react";
 
 import { api } from "../api/client";
 import { studies } from "../api/studies";
+import { likelyBefore } from "../experiments/plan";
 import { go } from "../ui/address";
 import { tellError } from "../ui/notices";
 import { useLoaded } from "../ui/useLoaded";
@@ -16,10 +17,16 @@ const PROCESSES = 2;
 /** Compares the scenario with another one: both run with the same random seeds, and their figures are paired. */
 export function CompareDialog({ scenario, onClose }: { scenario: string; onClose: () => void }) {
   const { value } = useLoaded(api.scenarios);
-  const [other, setOther] = useState<string | null>(null);
+  const [chosen, setChosen] = useState<string | null>(null);
   const [seeds, setSeeds] = useState(SEEDS);
   const [starting, setStarting] = useState(false);
   const others = (value ?? []).filter(({ name, error }) => name !== scenario && error === null);
+  const other =
+    chosen ??
+    likelyBefore(
+      scenario,
+      others.map(({ name }) => name),
+    );
   const start = (): void => {
     if (other === null) return;
     setStarting(true);
@@ -56,7 +63,7 @@ export function CompareDialog({ scenario, onClose }: { scenario: string; onClose
             }))}
             value={other}
             searchable
-            onChange={setOther}
+            onChange={setChosen}
           />
           <NumberInput
             mt="sm"

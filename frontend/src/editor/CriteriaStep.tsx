@@ -7,7 +7,15 @@ import { type ActorMeasureInfo, actorMeasures, allFigures, type FigureInfo } fro
 import type { Edit, ScenarioDocument } from "../api/types";
 import { useKeptForm } from "../ui/keptForm";
 import { useLoaded } from "../ui/useLoaded";
-import { type Criterion, criterionWords, EGO, OPERATORS, textOf, WHOLE_RUN } from "./criteria";
+import {
+  type Criterion,
+  criterionWords,
+  EGO,
+  OPERATORS,
+  suggestedCriteria,
+  textOf,
+  WHOLE_RUN,
+} from "./criteria";
 import { PartCard } from "./DemandParts";
 
 /** What must come out of a run for it to pass, as sentences. */
@@ -26,6 +34,7 @@ export function CriteriaStep({
   const egos = actors.filter(({ ego }) => ego).map(({ id }) => id);
   const ids = [...actors].sort((one, other) => Number(other.ego) - Number(one.ego)).map(({ id }) => id);
   const named = egos.length > 0 && !ids.includes(EGO) ? [EGO, ...ids] : ids;
+  const suggested = suggestedCriteria(actors, criteria);
   return (
     <>
       <Text size="sm">
@@ -52,6 +61,25 @@ export function CriteriaStep({
           </PartCard>
         );
       })}
+      {suggested.length > 0 && (
+        <section className="fold" aria-label={t`Suggestions`}>
+          <Text size="sm" fw={500}>
+            <Trans>Often asked</Trans>
+          </Text>
+          {suggested.map((text) => (
+            <Button
+              key={text}
+              size="compact-sm"
+              variant="default"
+              className="wrapping"
+              justify="flex-start"
+              onClick={() => change([...criteria, text], t`Add a criterion`)}
+            >
+              {criterionWords(text, { run, actors: single })}
+            </Button>
+          ))}
+        </section>
+      )}
       <NewCriterion
         run={run}
         single={single}

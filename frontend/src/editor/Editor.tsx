@@ -178,7 +178,7 @@ export function Editor({
         />
         <Problems problems={now.problems} graph={now.graph} onShow={now.showProblem} />
       </div>
-      <Stage now={now} saving={saving === "saving"} drawing={drawing}>
+      <Stage now={now} saving={saving === "saving"} drawing={drawing} assets={assets}>
         {now.light && now.lights && (
           <SignalPanel
             junctions={now.lights.junctions}

@@ -4,6 +4,7 @@ import { Trans } from "@lingui/react/macro";
 import { type ReactNode, useCallback, useEffect, useMemo, useRef, useState } from "react";
 
 import { localized } from "../language/localized";
+import type { Assets } from "../api/types";
 import type { PackedDrawing } from "../map/drawing";
 import { MapCanvas } from "../map/MapCanvas";
 import { choose } from "./handlers/select";
@@ -16,6 +17,9 @@ import { useGhosts } from "../recordings/useGhosts";
 import { useSlow } from "../ui/useSlow";
 import type { EditorNow } from "./useEditing";
 import { useScene } from "./useScene";
+import { LookChoice } from "../scenery/LookChoice";
+import { OverMap } from "../scenery/OverMap";
+import { lookedAfter, startsOf, useSpace } from "./useSpace";
 
 const NO_ROUTE = localized(() => t`No route leads from the start to this point inside the region`);
 
@@ -30,19 +34,33 @@ export function Stage({
   now,
   saving,
   drawing,
+  assets,
   children,
 }: {
   now: EditorNow;
   /** Whether the server is at a change. */
   saving: boolean;
   drawing: PackedDrawing;
+  assets: Assets | null;
   children: ReactNode;
 }) {
   const { graph, picker, document, step, handler, hover, setHover, ones, selection } = now;
   const [carried, setCarried] = useState<Carrier | null>(null);
   const [dock, setDock] = useState<Dock>("table");
   const [open, setOpen] = useState(true);
-  const view = usePlannedView(now, dock === "time" && open);
+  const space = useSpace(now, assets);
+  const { camera, heights, shows } = space;
+  const watched = lookedAfter(now.actors, selection);
+  // On the plan only who is selected is marked.
+  const marked = camera !== null ? watched : selection.length === 1 ? (selection[0] ?? null) : null;
+  const view = usePlannedView(now, dock === "time" && open, marked, shows);
+  const begun = useMemo(() => startsOf(now.actors, watched), [now.actors, watched]);
+  const inSpace = camera !== null && heights !== null;
+  const { handle } = now;
+  useEffect(() => {
+    if (!view.shown) handle.current?.setMoving(inSpace ? begun : null);
+  }, [handle, view.shown, inSpace, begun, shows]);
+  const pick = view.shown ? view.pick : handler.pick;
   const starts = useScene(now);
   const ghosts = useGhosts(now.scenario.name, view.shown ? view.moment : null);
   const scene = useMemo(
@@ -95,10 +113,11 @@ export function Stage({
           graph={graph}
           picker={picker}
           scene={scene}
-          handle={now.handle}
+          handle={handle}
+          over={space.handle}
           label={t`Map ${document.map.name}`}
           aim={handler.aim}
-          onPick={view.shown ? view.pick : handler.pick}
+          onPick={pick}
           onPoint={(at) => {
             if (!view.shown) setHover(at && (carried ?? handler).under(at));
           }}
@@ -117,6 +136,29 @@ export function Stage({
           }}
           onFrame={handler.frame}
         >
+          {inSpace && (
+            <OverMap
+              drawing={drawing}
+              graph={graph}
+              heights={heights}
+              weather={space.weather}
+              camera={camera}
+              from={() => handle.current?.view() ?? null}
+              label={`${t`Map ${document.map.name}`}, 3D`}
+              handle={space.handle}
+              onPick={pick}
+              onFail={() => space.look(null)}
+              onReady={space.changed}
+            />
+          )}
+          <div
+            className="stage-look"
+            onPointerDown={(event) => event.stopPropagation()}
+            onPointerMove={(event) => event.stopPropagation()}
+            onPointerUp={(event) => event.stopPropagation()}
+          >
+            <LookChoice camera={camera} onLook={space.look} />
+          </div>
           {slow ? (
             <div className="map-hint" role="status">
               <span className="waiting">
@@ -133,7 +175,7 @@ export function Stage({
               </div>
             )
           )}
-          <Legend step={step} />
+          {!inSpace && <Legend step={step} />}
         </MapCanvas>
         {children}
       </div>

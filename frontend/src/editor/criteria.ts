@@ -3,6 +3,7 @@ import { plural, t } from "@lingui/core/macro";
 import { served } from "../language/served";
 import { localized } from "../language/localized";
 import type { ActorMeasureInfo, FigureInfo } from "../api/figures";
+import type { Actor } from "../api/types";
 import { sentence } from "../ui/words";
 
 /** Operators of criteria, in the words of the reports. */
@@ -74,6 +75,27 @@ export function criterionWords(
   const op = OPERATORS().find(([sign]) => sign === parts.op)?.[1] ?? parts.op;
   const unit = parts.unit || measure.unit;
   return `${sentence(about)}: ${op} ${parts.bound}${unit ? ` ${unit}` : ""}`;
+}
+
+/** So many suggestions are offered at once. */
+const SUGGESTED = 5;
+
+/** What is asked of most scenes, of those that are not asked yet: no collision, a gap before who walks. */
+export function suggestedCriteria(
+  actors: readonly Pick<Actor, "id" | "ego" | "category">[],
+  criteria: readonly string[],
+): string[] {
+  const egos = actors.filter(({ ego }) => ego).map(({ id }) => id);
+  if (egos.length === 0) return [];
+  const taken = actors.some(({ id }) => id === EGO);
+  const walkers = actors.filter(({ category, ego }) => category === "pedestrian" && !ego);
+  return (taken ? egos : [EGO])
+    .flatMap((one) => [
+      `collided(${one}) == 0`,
+      ...walkers.map(({ id }) => `stopped_before(${one},${id}) >= 0.5 m`),
+    ])
+    .filter((text) => !criteria.includes(text))
+    .slice(0, SUGGESTED);
 }
 
 /** What the head of the step says. */

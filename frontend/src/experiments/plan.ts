@@ -288,3 +288,10 @@ export function titleOf(one: SweepCase, { parameters }: SweepCases, verdict: Ver
       : VERDICT_WORD()[verdict];
   return `${one.case}: ${values.join(", ")}: ${word}`;
 }
+
+/** What a scenario was before: the one it is a copy of by its name, or else the only other one. */
+export function likelyBefore(scenario: string, others: readonly string[]): string | null {
+  const originals = others.filter((name) => scenario.startsWith(`${name}-`));
+  const longest = originals.sort((one, two) => two.length - one.length)[0];
+  return longest ?? (others.length === 1 ? (others[0] ?? null) : null);
+}

@@ -73,7 +73,7 @@ interface Props {
   aim?: boolean;
   handle?: RefObject<MapHandle | null>;
   /** What lies over the map and shows the same road users and lights, while it is there. */
-  over?: RefObject<Pick<MapHandle, "setMoving" | "setHeads"> | null>;
+  over?: RefObject<Pick<MapHandle, "setMoving" | "setHeads" | "picture"> | null>;
   onPick?: (at: Pointed) => void;
   onPoint?: (at: Pointed | null) => void;
   /** Whether the drag that begins here takes something along instead of moving the map. */
@@ -229,7 +229,7 @@ export function MapCanvas({
         if (!there) apply({ ...view.current, x, y });
       },
       view: () => view.current,
-      picture: (into) => renderer.current?.picture(into) ?? null,
+      picture: (into) => (over?.current ?? renderer.current)?.picture(into) ?? null,
       vector: () => renderer.current?.vector(legendRows(host.current ?? document)) ?? null,
       seen: () => visible(view.current, size.current),
       pickMiddle: () =>

@@ -1,6 +1,5 @@
 import { t } from "@lingui/core/macro";
-import { Loader } from "@mantine/core";
-import { Suspense, useEffect, useMemo, useRef, useState } from "react";
+import { useEffect, useMemo, useRef, useState } from "react";
 
 import type { RunInfo } from "../api/runs";
 import type { Bounds, Category } from "../api/types";
@@ -9,9 +8,10 @@ import type { PackedDrawing } from "../map/drawing";
 import type { LoadedGraph } from "../map/loaded";
 import type { Mark, MarkKind, Scene } from "../map/scene";
 import type { Head } from "../signals/heads";
+import { LookChoice } from "../scenery/LookChoice";
+import { OverMap } from "../scenery/OverMap";
 import type { SceneryHandle } from "../scenery/SceneryView";
 import type { KeptPlace } from "../ui/kept";
-import { tell } from "../ui/notices";
 import type { Crowd } from "./frames";
 import { LaneTools } from "./LaneTools";
 import { QUANTITIES } from "./laneUse";
@@ -22,11 +22,10 @@ import { RunHint } from "./RunHint";
 import { ShareMenu } from "./ShareMenu";
 import { SpeedChart } from "./SpeedChart";
 import { type LaneData, useLaneUse } from "./useLaneUse";
-import { SceneryView, useScenery } from "./useScenery";
+import { useScenery } from "./useScenery";
 import type { Picture } from "./usePicture";
 import type { Player } from "./useReplay";
 import type { ViewsOfRun } from "./useViews";
-import { LookChoice } from "./LookChoice";
 import { ViewButtons, viewName } from "./ViewButtons";
 import { MOST_VIEWS, type RunSight } from "./views";
 
@@ -170,32 +169,19 @@ export function RunMap({
         }}
       >
         {inSpace && (
-          <div
-            className="run-scenery"
-            // The map below is not meant.
-            onPointerDown={(event) => event.stopPropagation()}
-            onPointerMove={(event) => event.stopPropagation()}
-            onPointerUp={(event) => event.stopPropagation()}
-          >
-            <Suspense fallback={<Loader aria-label={t`Loading the view in 3D`} />}>
-              <SceneryView
-                drawing={drawing}
-                graph={loaded.graph}
-                heights={parts.heights}
-                weather={parts.weather}
-                camera={camera}
-                from={() => handle.current?.view() ?? null}
-                label={`${name === null ? what : `${what}, ${name}`}, 3D`}
-                handle={scenery}
-                onPick={onPick}
-                onFail={() => {
-                  tell(t`This browser cannot show three dimensions; here is the plan.`);
-                  views.look(id, null);
-                }}
-                onReady={() => setShows((old) => old + 1)}
-              />
-            </Suspense>
-          </div>
+          <OverMap
+            drawing={drawing}
+            graph={loaded.graph}
+            heights={parts.heights}
+            weather={parts.weather}
+            camera={camera}
+            from={() => handle.current?.view() ?? null}
+            label={`${name === null ? what : `${what}, ${name}`}, 3D`}
+            handle={scenery}
+            onPick={onPick}
+            onFail={() => views.look(id, null)}
+            onReady={() => setShows((old) => old + 1)}
+          />
         )}
         <RunHint
           info={info}

@@ -9,6 +9,7 @@ import type { View } from "../map/view";
 import type { Head } from "../signals/heads";
 import type { Camera } from "./cameras";
 import { Heights } from "./heights";
+import { steer } from "./keys";
 import { Scenery } from "./scenery";
 
 /** What a view in three dimensions takes in, as the plan does. */
@@ -117,22 +118,10 @@ export default function SceneryView({
         if (at) onPick({ ...at, reach: REACH, shift: false });
       }}
       onKeyDown={(event) => {
-        const step = MOVES[event.key];
-        if (step) scenery.current?.pan(...step);
-        else if (event.key === "+" || event.key === "=") scenery.current?.zoom(1.3);
-        else if (event.key === "-") scenery.current?.zoom(1 / 1.3);
-        else return;
+        if (!scenery.current || !steer(scenery.current, event.key)) return;
         event.preventDefault();
         event.stopPropagation();
       }}
     />
   );
 }
-
-/** Shares of the distance that an arrow key moves the camera, to the right and ahead. */
-const MOVES: Readonly<Record<string, readonly [number, number] | undefined>> = {
-  ArrowLeft: [-0.1, 0],
-  ArrowRight: [0.1, 0],
-  ArrowUp: [0, 0.1],
-  ArrowDown: [0, -0.1],
-};

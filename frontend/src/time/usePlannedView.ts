@@ -32,20 +32,26 @@ export const withoutStarts = (scene: Scene): Scene => ({
 });
 
 /** The plan of the editor's scenario at a chosen moment, drawn on the map. */
-export function usePlannedView(now: EditorNow, wanted: boolean): PlannedView {
-  const { scenario, handle, selection } = now;
+export function usePlannedView(
+  now: EditorNow,
+  wanted: boolean,
+  /** Who is marked, and after whom a camera looks. */
+  one: string | null,
+  /** Another number each time that something else than before draws it. */
+  shows: number,
+): PlannedView {
+  const { scenario, handle } = now;
   const [moment, setMoment] = useState<number | null>(null);
   const plan = usePlanned(scenario.name, scenario.version, wanted);
   const { planned } = plan;
   const idle = now.tool === null && now.pick.now === null;
   const shown = wanted && idle && moment !== null && planned !== null;
-  const one = selection.length === 1 ? (selection[0] ?? null) : null;
   useEffect(() => {
     if (!shown) return;
     const map = handle.current;
     map?.setMoving(planned.at(moment, one));
     return () => map?.setMoving(null);
-  }, [handle, shown, planned, moment, one]);
+  }, [handle, shown, planned, moment, one, shows]);
   return {
     plan,
     moment,

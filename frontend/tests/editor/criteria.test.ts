@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { criteriaNote, criterionWords, partsOf, textOf } from "../../src/editor/criteria";
+import { criteriaNote, criterionWords, partsOf, suggestedCriteria, textOf } from "../../src/editor/criteria";
 
 const MEASURES = {
   run: [{ name: "mean_delay", label: "mean delay", unit: "s" }],
@@ -44,4 +44,18 @@ test("the step says how many there are", () => {
     "1 criterion",
     "2 criteria",
   ]);
+});
+
+test("no collision and a gap before each pedestrian are suggested, until they are asked", () => {
+  const actors = [
+    { id: "car-1", ego: true, category: "car" },
+    { id: "van-1", ego: false, category: "van" },
+    { id: "child", ego: false, category: "pedestrian" },
+  ] as const;
+  const [hit, gap] = ["collided(ego) == 0", "stopped_before(ego,child) >= 0.5 m"];
+  expect(suggestedCriteria(actors, [])).toEqual([hit, gap]);
+  expect(suggestedCriteria(actors, ["collided(ego) == 0"])).toEqual([gap]);
+  expect(suggestedCriteria(actors.slice(1), [])).toEqual([]);
+  const many = Array.from({ length: 9 }, (_, n) => ({ ...actors[2], id: `child-${n}` }));
+  expect(suggestedCriteria([actors[0], ...many], [])).toHaveLength(5);
 });

@@ -11,6 +11,7 @@ import {
   readPlace,
   type Rule,
   ruleOf,
+  rulesOf,
   sentence,
   settled,
 } from "../../src/editor/rules/draft";
@@ -201,4 +202,23 @@ test("road users are offered what they can do, and a new rule begins with that",
   const van = newDraft(["car-1", "van-1"], []);
   expect(actionsFor(van.then, true, ["car-1"])[0]?.[0]?.kind).toBe("walk");
   expect(actionsFor(van.then, false, ["car-1"])).toEqual(van.then);
+});
+
+test("a pedestrian waits until 30 m, by a rule of its own; who has no rule yet comes first", () => {
+  const rule = { actor: "van-1" } as Rule;
+  const walker = newDraft(["car-1", "van-1", "pedestrian-1"], [rule], ["pedestrian-1"]);
+  expect(walker).toMatchObject({ actor: "pedestrian-1", when: { values: { below: 30 } }, waits: true });
+  const [wait, walk] = rulesOf(walker, ["pedestrian-1"], ["rule-1-wait"]);
+  expect(wait).toMatchObject({
+    id: "rule-1-wait+",
+    actor: "pedestrian-1",
+    when: { time: { after: 0 } },
+    then: [{ stop: {} }],
+  });
+  expect(walk).toEqual(ruleOf(walker));
+  expect(walk).not.toHaveProperty("waits");
+  expect(rulesOf({ ...walker, waits: false }, ["pedestrian-1"], [])).toEqual([walk]);
+  expect(rulesOf(walker, [], [])).toEqual([walk]); // a rule moves the pedestrian already
+  const van = newDraft(["car-1", "van-1"], []);
+  expect(rulesOf(van, ["pedestrian-1"], [])).toEqual([ruleOf(van)]);
 });

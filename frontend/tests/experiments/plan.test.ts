@@ -5,6 +5,7 @@ import {
   countOf,
   faultOf,
   lasting,
+  likelyBefore,
   marksOf,
   newForm,
   setOf,
@@ -151,4 +152,11 @@ test("marks are round numbers inside the range, and times are in words", () => {
     "10 min",
     "2.5 h",
   ]);
+});
+
+test("a scenario is compared with the one it is a copy of, or with the only other one", () => {
+  expect(likelyBefore("peak-copy", ["other", "peak"])).toBe("peak");
+  expect(likelyBefore("peak-copy-copy", ["peak", "peak-copy"])).toBe("peak-copy");
+  expect(likelyBefore("peak", ["other"])).toBe("other");
+  expect(likelyBefore("peak", ["one", "two"])).toBeNull();
 });

@@ -1,4 +1,4 @@
-import { Button, Group, Stack, Text } from "@mantine/core";
+import { Button, Checkbox, Group, Stack, Text } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { useEffect } from "react";
@@ -7,7 +7,7 @@ import { useKeptForm } from "../../ui/keptForm";
 import { Committed } from "../Committed";
 import { CommittedText } from "../FormParts";
 import { WhenForm } from "./ConditionForm";
-import { actionsFor, type Draft, missing, sentence } from "./draft";
+import { actionsFor, canWait, type Draft, missing, sentence } from "./draft";
 import { type About, ChoiceInput } from "./FieldInput";
 import { ThenForm } from "./ThenForm";
 
@@ -21,6 +21,7 @@ export function RuleForm({
   actors,
   rules,
   walkers,
+  idle,
   pick,
   onDraft,
   onSave,
@@ -30,6 +31,8 @@ export function RuleForm({
   saveLabel: string;
   /** Of the actors those on foot. */
   walkers: readonly string[];
+  /** Of these, those whom no rule moves. */
+  idle: readonly string[];
   /** With every change, and null at the end: for the map. */
   onDraft: (draft: Draft | null) => void;
   onSave: (draft: Draft) => void;
@@ -64,6 +67,14 @@ export function RuleForm({
         onChange={(then) => put({ then })}
         {...about}
       />
+      {canWait(draft, idle) && (
+        <Checkbox
+          label={t`Waits until then`}
+          description={t`By a rule of its own`}
+          checked={draft.waits ?? false}
+          onChange={({ currentTarget: { checked } }) => put({ waits: checked })}
+        />
+      )}
       <Committed
         label={t`Fires at most`}
         suffix={draft.times === 1 ? t` time` : t` times`}

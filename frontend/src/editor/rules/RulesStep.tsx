@@ -7,7 +7,7 @@ import { forgetForm, useKeptForm } from "../../ui/keptForm";
 import { PartCard } from "../DemandParts";
 import { OpenAndShow } from "../FormParts";
 import type { PlacePick } from "../pick";
-import { type Draft, draftOf, newDraft, type Rule, ruleOf, sentence } from "./draft";
+import { type Draft, draftOf, newDraft, type Rule, rulesOf, sentence } from "./draft";
 import { RULE_FORM, RuleForm } from "./RuleForm";
 
 /** Rules as sentences, with a form for each; where they act is on the map. */
@@ -22,13 +22,14 @@ export function RulesStep({
   pick: PlacePick;
   /** The rule whose form is open, as it is now. */
   onDraft: (draft: Draft | null) => void;
-  onEdit: (edit: Edit, label?: string) => void;
+  onEdit: (edit: Edit | readonly Edit[], label?: string) => void;
   onShow: (rule: Rule) => void;
 }) {
   /** Id of the rule whose form is open, "" for a new one. */
   const [open, setOpen] = useKeptForm<string | null>("open rule", null);
   const ids = [...actors].sort((one, other) => Number(other.ego) - Number(one.ego)).map(({ id }) => id);
   const walkers = actors.filter(({ category }) => category === "pedestrian").map(({ id }) => id);
+  const idle = walkers.filter((id) => rules.every(({ actor }) => actor !== id));
   const turnTo = (id: string | null): void => {
     pick.stop();
     forgetForm(RULE_FORM);
@@ -37,7 +38,10 @@ export function RulesStep({
   const close = (): void => turnTo(null);
   const save = (draft: Draft): void => {
     const renamed = open && open !== draft.id.trim() ? { instead_of: open } : {};
-    onEdit({ kind: "set_rule", rule: ruleOf(draft), ...renamed });
+    const taken = rules.map(({ id }) => id);
+    const made = rulesOf(draft, idle, taken).map((rule): Edit => ({ kind: "set_rule", rule, ...renamed }));
+    if (made.length > 1) onEdit(made, t`Add the rule ${draft.id.trim()}`);
+    else onEdit(made);
     close();
   };
   const form = (draft: Draft, saveLabel: string) => (
@@ -46,6 +50,7 @@ export function RulesStep({
       saveLabel={saveLabel}
       actors={ids}
       walkers={walkers}
+      idle={idle}
       rules={rules.map(({ id }) => id).filter((id) => id !== open)}
       pick={pick}
       onDraft={onDraft}

@@ -36,6 +36,8 @@ export interface Draft {
   when: Condition;
   then: readonly (readonly Item[])[];
   times: number;
+  /** Of a new rule: whether a pedestrian whom it moves waits at its place until then. */
+  waits?: boolean;
 }
 
 export const isGroup = (condition: Condition): condition is ConditionGroup => "join" in condition;
@@ -90,6 +92,19 @@ export function ruleOf({ id, actor, when, then, times }: Draft): SentRule {
     }),
     times,
   } as SentRule;
+}
+
+/** Whether a new rule is the first to move a pedestrian, who then can wait for it. */
+export const canWait = ({ actor, then, waits }: Draft, idle: readonly string[]): boolean =>
+  waits !== undefined && idle.includes(actor) && then.flat().some(({ kind }) => kind === "walk");
+
+/** Rules that are sent for a draft: its own, and before it one that keeps a pedestrian of `idle` at its place. */
+export function rulesOf(draft: Draft, idle: readonly string[], taken: readonly string[]): SentRule[] {
+  const rule = ruleOf(draft);
+  if (!draft.waits || !canWait(draft, idle)) return [rule];
+  let id = `${rule.id}-wait`;
+  while (taken.includes(id)) id += "+";
+  return [{ id, actor: rule.actor, when: { time: { after: 0 } }, then: [{ stop: {} }] } as SentRule, rule];
 }
 
 /** All conditions of a rule that are not combinations, in order. */
@@ -227,13 +242,17 @@ export const firstAction = (onFoot: boolean, others: readonly string[]): Item =>
 export const actionsFor = (then: Draft["then"], onFoot: boolean, others: readonly string[]): Draft["then"] =>
   then.map((items) => items.map((one) => (canDo(one.kind, onFoot) ? one : firstAction(onFoot, others))));
 
-/** A rule for a begin: of those there are, the first that is not the ego cuts in, or walks. */
+/** Metres to the ego at which a pedestrian walks: what a car at 50 km/h needs to stop. */
+const WALKS_AT = 30;
+
+/** A rule for a begin: of those without one, the first that is not the ego cuts in, or walks. */
 export function newDraft(
   ids: readonly string[],
   rules: readonly Rule[],
   walkers: readonly string[] = [],
 ): Draft {
-  const actor = ids[1] ?? ids[0] ?? "";
+  const idle = ids.slice(1).find((id) => rules.every((rule) => rule.actor !== id));
+  const actor = idle ?? ids[1] ?? ids[0] ?? "";
   const others = ids.filter((id) => id !== actor);
   const onFoot = walkers.includes(actor);
   const taken = new Set(rules.map(({ id }) => id));
@@ -244,5 +263,8 @@ export function newDraft(
     others.length > 0 && !onFoot
       ? newItem("cut_in", actionKind("cut_in"), others)
       : firstAction(onFoot, others);
-  return { id: `rule-${number}`, actor, when: newCondition(condition, others), then: [[action]], times: 1 };
+  const when = newCondition(condition, others);
+  if (condition === "distance" && !isGroup(when)) when.values = { ...when.values, below: WALKS_AT };
+  const id = `rule-${number}`;
+  return { id, actor, when, then: [[action]], times: 1, waits: true };
 }

@@ -1,8 +1,10 @@
+import "./scenery.css";
+
 import { Select } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 
 import { localized } from "../language/localized";
-import { type Camera, isCamera } from "../scenery/cameras";
+import { type Camera, isCamera } from "./cameras";
 
 const PLAN = "plan";
 const LOOKS = localized(() => [
@@ -12,7 +14,7 @@ const LOOKS = localized(() => [
   { value: "seat", label: t`3D, driver's seat` },
 ]);
 
-/** How a run is looked at: as a plan, or in three dimensions from somewhere. */
+/** How a map is looked at: as a plan, or in three dimensions from somewhere. */
 export function LookChoice({
   camera,
   onLook,
