@@ -18,7 +18,7 @@ import numpy as np
 
 import tests.carla.mirror.test_mirror_on_maps as judge
 from bench.common import shared_maps
-from odscen.app.scenarios import generate
+from odscen.app.generation import generate
 from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 

@@ -24,7 +24,8 @@ from pathlib import Path
 from typing import Any
 
 from bench.study_kills import MARK, processes_of
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings

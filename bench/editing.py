@@ -20,7 +20,8 @@ from playwright.sync_api import expect
 
 from bench.canvas import TOWN
 from bench.common import shared_maps
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.scenario_document import Scenario

@@ -21,9 +21,10 @@ from pathlib import Path
 import numpy as np
 
 from bench.common import shared_maps
+from odscen.app.generation import generate
 from odscen.app.maps import load_map
 from odscen.app.running.runs import carry_out, check_run, prepare_run
-from odscen.app.scenarios import generate, read_scenario
+from odscen.app.scenarios import read_scenario
 from odscen.maps.map_entry import MapEntry
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace

@@ -21,7 +21,8 @@ from websockets.sync.client import connect
 
 from bench.canvas import TOWN
 from bench.common import shared_maps
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings

@@ -25,7 +25,8 @@ from contextlib import suppress
 from pathlib import Path
 
 from odscen.app.demand import demands
-from odscen.app.scenarios import SUFFIX, generate, read_scenario, write_scenario
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX, read_scenario, write_scenario
 from odscen.base.atomic_folders import clear_leftovers
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace

@@ -20,7 +20,8 @@ import uvicorn
 from websockets.sync.client import connect
 
 from bench import recording
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.runs import layout

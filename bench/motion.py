@@ -18,8 +18,9 @@ import polars as pl
 
 from bench.common import shared_maps
 from bench.kills import morning
+from odscen.app.generation import generate
 from odscen.app.running.batches import run_many
-from odscen.app.scenarios import generate, write_scenario
+from odscen.app.scenarios import write_scenario
 from odscen.app.template_scenarios import template_scenario, templates
 from odscen.base.errors import OdscenError
 from odscen.cli.map_commands import names_for

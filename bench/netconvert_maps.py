@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any
 from starlette.testclient import TestClient
 
 from bench.common import shared_maps
+from odscen.app.generation import generate
 from odscen.app.running import batches
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.scenarios import SUFFIX
 from odscen.base.errors import OdscenError
 from odscen.cli.map_commands import names_for
 from odscen.figures.measures.summary import actors_from_json

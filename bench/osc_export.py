@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 from lxml import etree
 
 from odscen.app.exchange.exports import export, export_run
+from odscen.app.generation import generate
 from odscen.app.running.runs import run
-from odscen.app.scenarios import generate
 from odscen.app.template_scenarios import write_template
 from odscen.formats.openscenario.dialect import VERSIONS
 from odscen.maps.store import Workspace

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
+from odscen.app.generation import generate
 from odscen.app.running.runs import run
-from odscen.app.scenarios import generate, read_scenario
+from odscen.app.scenarios import read_scenario
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings

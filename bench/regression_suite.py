@@ -19,11 +19,12 @@ import tempfile
 from pathlib import Path
 
 from bench.short_runs import JOBS, POOL, spent_by
-from odscen.app.scenarios import GenerationSettings, generate
+from odscen.app.generation import generate
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.runs import layout
 from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.sampling.generation_settings import GenerationSettings
 
 SEEDS = (1, 2, 3)
 SECONDS = 60.0

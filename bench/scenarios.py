@@ -14,8 +14,8 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 from bench.common import shared_maps
+from odscen.app.generation import generate
 from odscen.app.running import batches
-from odscen.app.scenarios import generate
 from odscen.cli.map_commands import names_for
 from odscen.figures.measures.summary import ActorOutcome, actors_from_json
 from odscen.maps.shipped import shipped_maps

@@ -21,7 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from odscen.app.scenarios import SUFFIX, generate, read_scenario
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX, read_scenario
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps

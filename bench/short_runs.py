@@ -20,10 +20,11 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from odscen.app.scenarios import GenerationSettings, generate
+from odscen.app.generation import generate
 from odscen.maps.store import Workspace
 from odscen.runs import layout
 from odscen.scenario.document.sampling_config import SamplingConfig
+from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.sumo.runner.forked_worker import worker_environment
 
 if TYPE_CHECKING:

@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import odscen
-from odscen.app.scenarios import generate, read_scenario, write_scenario
+from odscen.app.generation import generate
+from odscen.app.scenarios import read_scenario, write_scenario
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
 from odscen.scenario.document.rules_document import StoryRule

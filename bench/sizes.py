@@ -33,7 +33,8 @@ import psutil
 
 from bench import size_documents as grown
 from bench import size_received as received
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings

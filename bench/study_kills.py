@@ -38,7 +38,7 @@ import psutil
 from distributed import LocalCluster, Status
 
 from bench.studies import QUIET
-from odscen.app.scenarios import generate
+from odscen.app.generation import generate
 from odscen.experiments.dask_executor import CACHE_VARIABLE
 from odscen.experiments.journal import JOURNAL_FILE, PARTS_FOLDER, read_rows
 from odscen.experiments.studies import TABLE_FILE

@@ -20,8 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from odscen.app.exchange.exports import export, export_run
+from odscen.app.generation import generate
 from odscen.app.running.batches import run_many
-from odscen.app.scenarios import generate, read_scenario
+from odscen.app.scenarios import read_scenario
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
 from odscen.runs.layout import SCENARIO_FILE

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from odscen.app.exchange.exports import export
     from odscen.app.exchange.imports import ImportedFile, import_file
     from odscen.app.exchange.recorded_traffic import read_recorded_traffic
+    from odscen.app.generation import generate
     from odscen.app.learner_arrays import scenario_arrays, scenario_from_arrays
     from odscen.app.running.batches import run_many
     from odscen.app.running.reports import renew_report
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from odscen.app.running.runs import run
     from odscen.app.running.watched_runs import WatchedRun, watch
     from odscen.app.scenarios import check_scenario as check
-    from odscen.app.scenarios import generate, read_scenario, write_scenario
+    from odscen.app.scenarios import read_scenario, write_scenario
     from odscen.app.signals.green_waves import coordinate_signals
     from odscen.app.signals.signal_evaluation import evaluate_signals
     from odscen.app.signals.signal_optimisation import time_signals
@@ -96,7 +97,7 @@ _HOMES = {
     "Scenario": "odscen.scenario.document.scenario_document",
     "GenerationSettings": "odscen.scenario.sampling.generation_settings",
     "Problem": "odscen.scenario.document.problems",
-    "generate": "odscen.app.scenarios",
+    "generate": "odscen.app.generation",
     "read_scenario": "odscen.app.scenarios",
     "write_scenario": "odscen.app.scenarios",
     "check": "odscen.app.scenarios:check_scenario",

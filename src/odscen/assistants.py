@@ -12,8 +12,9 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from odscen.app.editing import Editing
+from odscen.app.generation import generate
 from odscen.app.running.runs import run as run_one
-from odscen.app.scenarios import SUFFIX, check_scenario, generate, read_scenario, write_scenario
+from odscen.app.scenarios import SUFFIX, check_scenario, read_scenario, write_scenario
 from odscen.app.template_scenarios import template_scenario, templates
 from odscen.base.errors import InputError, MissingDependencyError, NotFoundError, OdscenError
 from odscen.experiments.sweeps import SweepSettings, sweep

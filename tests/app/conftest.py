@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from odscen.app.scenarios import generate
+from odscen.app.generation import generate
 from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 

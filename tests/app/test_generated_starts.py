@@ -9,9 +9,10 @@ import numpy as np
 import polars as pl
 import pytest
 
+from odscen.app.generation import generate
 from odscen.app.generators import GeneratorDoor
 from odscen.app.running.batches import run_many
-from odscen.app.scenarios import generate, read_scenario
+from odscen.app.scenarios import read_scenario
 from odscen.learning.fill import CheckedFill
 from odscen.maps.store import Workspace
 from odscen.runs.recorded import trajectory_files

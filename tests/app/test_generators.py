@@ -12,10 +12,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from odscen.app.generation import generate
 from odscen.app.generators import GeneratorDoor, Placer, installed_generators, open_generator
 from odscen.app.maps import load_map
 from odscen.app.running.runs import carry_out, check_run, prepare_run
-from odscen.app.scenarios import generate, read_scenario
+from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError
 from odscen.learning.fill import CheckedFill, Fill, FillRequest, fill_from_bytes
 from odscen.maps.store import Workspace

@@ -13,7 +13,8 @@ from lxml import etree
 
 from odscen.app.exchange.exports import export
 from odscen.app.exchange.imports import import_file
-from odscen.app.scenarios import generate, read_scenario
+from odscen.app.generation import generate
+from odscen.app.scenarios import read_scenario
 from odscen.app.template_scenarios import template_scenario
 from odscen.changes.acting_differences import acting_differences
 from odscen.formats.openscenario.dialect import VERSIONS

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from odscen.app.scenarios import generate, read_scenario, scenario_files
+from odscen.app.generation import generate
+from odscen.app.scenarios import read_scenario, scenario_files
 from odscen.base.errors import InputError, NotFoundError
 from odscen.maps.store import BUILDER, Workspace, is_outdated
 from odscen.scenario.document.sampling_config import SamplingConfig

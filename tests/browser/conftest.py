@@ -15,7 +15,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect
 
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX
 from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from tests.browser.pages import OdscenPage

@@ -14,8 +14,9 @@ import psutil
 import pytest
 from playwright.sync_api import Page, expect
 
+from odscen.app.generation import generate
 from odscen.app.running import batches
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.scenarios import SUFFIX
 from odscen.experiments.comparison_page import comparison_page
 from odscen.experiments.comparisons import compare_runs, read_runs
 from odscen.experiments.plan import StudyPlan, StudyRuns, StudyVariant

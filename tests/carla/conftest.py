@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from odscen.app.scenarios import generate
+from odscen.app.generation import generate
 from odscen.lanegraph.query import node_index
 from odscen.maps.store import Workspace
 from odscen.scenario.document.json_form import dumps

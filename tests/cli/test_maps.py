@@ -204,7 +204,8 @@ def test_add_warns_of_a_network_that_does_not_follow_its_map_and_sampling_says_w
     tmp_path,
 ):
     file = tmp_path / "inside.xodr"
-    file.write_text(document(road("1", junction="9"), '<junction id="9" name=""/>'))
+    links = '<connection id="0" incomingRoad="1" connectingRoad="1" contactPoint="start"/>'
+    file.write_text(document(road("1", junction="9"), f'<junction id="9">{links}</junction>'))
     done = odscen("maps", "add", file, "--workspace", tmp_path, "--json")
     assert done.code == 0
     warning, added = done.err.splitlines()

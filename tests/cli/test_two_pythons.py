@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from odscen.app.scenarios import generate
+from odscen.app.generation import generate
 from odscen.base.version import __version__
 from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings

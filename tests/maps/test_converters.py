@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from odscen.app.generation import generate
 from odscen.app.running.runs import run
-from odscen.app.scenarios import check_scenario, generate
+from odscen.app.scenarios import check_scenario
 from odscen.base.checksums import sums_of, write_sums
 from odscen.base.errors import InputError, ToolError
 from odscen.convert.model.conversion_settings import ConversionSettings

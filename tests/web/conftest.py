@@ -14,7 +14,8 @@ import pytest
 import uvicorn
 from starlette.testclient import TestClient
 
-from odscen.app.scenarios import SUFFIX, generate
+from odscen.app.generation import generate
+from odscen.app.scenarios import SUFFIX
 from odscen.maps.store import Workspace
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 from odscen.web.application import create_app

@@ -19,7 +19,8 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from odscen.app.scenarios import generate, read_scenario
+from odscen.app.generation import generate
+from odscen.app.scenarios import read_scenario
 from odscen.app.signals.signal_plans import signal_programs
 from odscen.maps.store import Workspace
 from odscen.maps.wastebasket import Wastebasket

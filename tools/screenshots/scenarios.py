@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from odscen.app.generation import generate
 from odscen.app.maps import load_map
-from odscen.app.scenarios import SUFFIX, generate, write_scenario
+from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.app.template_scenarios import template_scenario
 from odscen.experiments.plan import StudyPlan, StudyRuns, StudyVariant
 from odscen.experiments.studies import begin_study_of, carry_out_study

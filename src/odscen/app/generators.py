@@ -32,7 +32,7 @@ from odscen.learning.offered_options import OptionValue, values_for
 from odscen.scenario.document.distributions import stream
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     import numpy as np
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from odscen.learning.offered_models import OfferedModel
     from odscen.learning.traffic_snapshots import LightView
     from odscen.scenario.document.scenario_document import Actor
+    from odscen.scenario.document.signals_document import Signals
     from odscen.scenario.edits.actor_edits import NamedPlacer
     from odscen.scenario.placing.region import Region
     from odscen.scenario.sampling.sampler import WantedUsers
@@ -54,6 +55,8 @@ REFERENCE = "reference"
 """Name of the generator that ships with odscen."""
 TIME_LIMIT = 600.0
 """Seconds that another program may take for one fill."""
+LONGEST_WARM_UP = 3600.0
+"""Seconds."""
 _LAST_LINES = 5
 MOST_BYTES = 1_000_000_000
 """Of the file that another program writes."""
@@ -62,13 +65,15 @@ MOST_BYTES = 1_000_000_000
 class GeneratorDoor(NamedTuple):
     """Where traffic comes from: a class or an entry point by name, or the line of a command.
 
-    ``options`` are those of a class, see :mod:`odscen.learning.offered_options`.
+    ``options`` are those of a class, see :mod:`odscen.learning.offered_options`. What is placed is
+    driven for ``warm_up`` seconds before a scenario begins.
     """
 
     name: str | None = None
     command: str | None = None
     time_limit: float = TIME_LIMIT
     options: Mapping[str, OptionValue] = MappingProxyType({})
+    warm_up: float = 0.0
 
 
 def open_generator(door: GeneratorDoor) -> Generator:
@@ -79,6 +84,10 @@ def open_generator(door: GeneratorDoor) -> Generator:
     InputError
         If there is none, it cannot be imported or made, or an option is not possible.
     """
+    if not 0.0 <= door.warm_up <= LONGEST_WARM_UP:
+        raise InputError(
+            f"a warm-up takes 0 to {LONGEST_WARM_UP:g} s, not {door.warm_up:g} s", element="warm_up"
+        )
     if door.command is not None and door.name is not None:
         raise InputError("a generator is given by its name or as a command, not both")
     if door.command is not None:
@@ -112,7 +121,7 @@ def placer_of(loaded: LoadedMap) -> NamedPlacer:
     """
 
     def place_by(
-        name: str, options: Mapping[str, OptionValue], seed: int
+        name: str, options: Mapping[str, OptionValue], seed: int, signals: Signals
     ) -> Callable[[Region, WantedUsers], tuple[Actor, ...]]:
         from odscen.sumo.realize.signals_ahead import lights_at_start
 
@@ -120,7 +129,7 @@ def placer_of(loaded: LoadedMap) -> NamedPlacer:
         if name not in known:
             raise NotFoundError("generator", name, known)
         placer = Placer(open_generator(GeneratorDoor(name, options=options)))
-        lights = lights_at_start(loaded.sumo)
+        lights = lights_at_start(loaded.sumo, signals)
         return placer.for_scenario(loaded.usable.bodies, seed, lights=lights)
 
     return place_by
@@ -144,7 +153,12 @@ class Placer:
         self.checked: CheckedFill | None = None
 
     def for_scenario(
-        self, bodies: Mapping[Category, Body], seed: int, *, lights: LightView | None = None
+        self,
+        bodies: Mapping[Category, Body],
+        seed: int,
+        *,
+        lights: LightView | None = None,
+        drive: Callable[[Region, FillRequest, Sequence[Actor]], Fill | None] | None = None,
     ) -> Callable[[Region, WantedUsers], tuple[Actor, ...]]:
         """Make the function that asks for a fill of a region, and makes actors of what is good.
 
@@ -154,6 +168,9 @@ class Placer:
         ----------
         lights
             What the lights of the map show at the beginning, if it has any.
+        drive
+            Drives what is placed before the scenario begins, and says where all are then; ``None``
+            for nobody that could be placed.
         """
 
         def place(region: Region, crew: WantedUsers) -> tuple[Actor, ...]:
@@ -171,6 +188,10 @@ class Placer:
             given = self._generator.fill(region.graph, request, stream(seed, "generator"))
             fill = given if isinstance(given, Fill) else fill_from_arrays(given)
             self.checked = checked_fill(fill, request, region)
+            if drive is not None and self.checked.actors:
+                driven = drive(region, request, self.checked.actors)
+                if driven is not None:
+                    self.checked = checked_fill(driven, request, region)
             if self.checked.given and not self.checked.actors:
                 why = self.checked.remarks[0].why
                 raise InputError(

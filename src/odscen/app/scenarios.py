@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from odscen.app.maps import load_map, map_of
+from odscen.app.maps import map_of
 from odscen.base.errors import InputError
 from odscen.base.given_files import as_path, is_path, read_given, read_given_text
 from odscen.base.text_files import write_text
@@ -13,17 +13,14 @@ from odscen.maps.folder_names import plain_name
 from odscen.maps.wastebasket import SCENARIO_SUFFIX
 from odscen.scenario.checks.scenario_checks import check
 from odscen.scenario.document.json_form import dumps
-from odscen.scenario.document.sampling_config import MapFilter, SamplingConfig, loads_config
+from odscen.scenario.document.sampling_config import SamplingConfig, loads_config
 from odscen.scenario.forms.any_form import read_any
-from odscen.scenario.sampling.generation_settings import ONE_SCENARIO, GenerationSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
     from pathlib import Path
 
-    from odscen.app.generators import GeneratorDoor
     from odscen.base.given_files import GivenPath
-    from odscen.learning.fill import CheckedFill
     from odscen.maps.store import Workspace
     from odscen.scenario.document.problems import Problem
     from odscen.scenario.document.scenario_document import Scenario
@@ -178,104 +175,3 @@ def read_config(path: Path | None) -> SamplingConfig:
     if path is None:
         return SamplingConfig()
     return loads_config(read_given_text(path), file=str(path))
-
-
-def generate(
-    workspace: Workspace,
-    *,
-    settings: GenerationSettings = ONE_SCENARIO,
-    out: GivenPath | None = None,
-    generator: GeneratorDoor | None = None,
-    filled: Callable[[str, CheckedFill], None] | None = None,
-    progress: Callable[[str, float], None] | None = None,
-) -> list[Path]:
-    """Sample scenarios and write one file each.
-
-    Parameters
-    ----------
-    workspace
-        Has the maps.
-    settings
-        Which scenarios.
-    out
-        Folder; the workspace's ``scenarios`` if not given.
-    generator
-        Places the actors; they are placed at random if not given.
-    filled
-        Called with the name of each scenario and what was made of the generator's fill.
-    progress
-        Called with the name of each scenario and the share (0 to 1) that is done.
-
-    Returns
-    -------
-    list of Path
-        The files, in the order of their seeds.
-
-    Raises
-    ------
-    NotFoundError
-        If there is no such map.
-    InputError
-        If there is no map at all, or the generator does not give a fill.
-    ScenarioError
-        If the configuration cannot be met.
-    """
-    # A run needs nothing of these, and would wait for their imports.
-    from odscen.app.generators import Placer, open_generator
-    from odscen.scenario.sampling.sampler import choose_map, sample_scenario
-    from odscen.sumo.realize.signals_ahead import lights_at_start
-
-    folder = workspace.scenarios if out is None else as_path(out)
-    placer = None if generator is None else Placer(open_generator(generator))
-    config, map_name = settings.sampling, settings.map_name
-    statistics: dict[str, Any] = {}
-    if map_name is not None:
-        workspace.map(map_name)
-    else:
-        statistics = _map_statistics_by_name(workspace, config.maps)
-        if not statistics:
-            raise InputError(
-                f"there is no map in {workspace.root}; add one with: odscen maps add FILE.xodr"
-            )
-    paths = []
-    for number in range(settings.count):
-        seed = settings.seed + number
-        name = map_name or choose_map(config.maps, statistics, seed=seed)
-        loaded = load_map(workspace.map(name))
-        title = f"{name}-{seed:04d}"
-        if progress is not None:
-            progress(title, number / settings.count)
-        usable = loaded.usable
-        scenario = sample_scenario(
-            loaded.sumo.graph,
-            config,
-            seed=seed,
-            name=title,
-            usable=usable,
-            place=None
-            if placer is None
-            else placer.for_scenario(usable.bodies, seed, lights=lights_at_start(loaded.sumo)),
-        )
-        if filled is not None and placer is not None and placer.checked is not None:
-            filled(title, placer.checked)
-        file = folder / f"{title}{SUFFIX}"
-        paths.append(write_scenario(scenario, file))
-    return paths
-
-
-def _map_statistics_by_name(workspace: Workspace, maps: MapFilter) -> dict[str, dict[str, Any]]:
-    """Statistics of all maps, by name; those that decide what is drawn are up to date.
-
-    Only maps whose statistics decide are opened: what an older odscen has built is then rebuilt.
-    """
-    from odscen.scenario.sampling.sampler import passes_by_name
-
-    by_statistics = bool(maps.where) or maps.weight_by is not None
-    return {
-        map_entry.name: (
-            workspace.map(map_entry.name)
-            if by_statistics and passes_by_name(maps, map_entry.name)
-            else map_entry
-        ).info["statistics"]
-        for map_entry in workspace.maps()
-    }

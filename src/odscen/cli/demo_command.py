@@ -19,7 +19,7 @@ def demo(
     as_json: JsonOption = False,
 ) -> None:
     """Build the maps that ship, sample a scenario, run it, and name the report to open."""
-    from odscen.app import scenarios
+    from odscen.app import generation
     from odscen.app.running import runs
     from odscen.maps.shipped import shipped_maps
     from odscen.maps.store import Workspace
@@ -32,7 +32,7 @@ def demo(
         log(f"{entry.name}: {entry.info['graph']['nodes']:,} nodes ({entry.path('preview')})")
     with progress("generating") as step:
         settings = GenerationSettings(map_name=DEMO_MAP, seed=seed, fill=DEMO_FILL, roi_segments=60)
-        paths = scenarios.generate(store, settings=settings, progress=step)
+        paths = generation.generate(store, settings=settings, progress=step)
     log(f"Scenario: {paths[0]}")
     result = runs.run(store, paths[0])
     if as_json:

@@ -73,6 +73,15 @@ def generate(
     generator_timeout: Annotated[
         float, typer.Option(min=1, metavar="SECONDS", help="Time that it may take for a scenario.")
     ] = 600.0,
+    warm_up: Annotated[
+        float,
+        typer.Option(
+            min=0,
+            max=3600,
+            metavar="SECONDS",
+            help="Drive what a generator places for so long before the scenario begins.",
+        ),
+    ] = 0.0,
     out: Annotated[
         Path | None, typer.Option(help="Folder to write to. (default: the workspace's scenarios)")
     ] = None,
@@ -80,7 +89,7 @@ def generate(
     as_json: JsonOption = False,
 ) -> None:
     """Sample scenarios on a map: region, weather, actors, goals. The same seed, the same bytes."""
-    from odscen.app import scenarios
+    from odscen.app import generation, scenarios
     from odscen.app.generators import GeneratorDoor
     from odscen.maps.store import Workspace
     from odscen.scenario.sampling.generation_settings import GenerationSettings
@@ -96,12 +105,14 @@ def generate(
     door = None
     if generator is not None or generator_cmd is not None:
         given = option_settings(generator_option or (), element="--generator-option")
-        door = GeneratorDoor(generator, generator_cmd, generator_timeout, given)
+        door = GeneratorDoor(generator, generator_cmd, generator_timeout, given, warm_up)
     elif generator_option:
         raise InputError("--generator-option is of a generator: name one with --generator")
+    elif warm_up:
+        raise InputError("--warm-up is for what a generator places: name one with --generator")
     fills: dict[str, CheckedFill] = {}
     with progress("generating") as step:
-        paths = scenarios.generate(
+        paths = generation.generate(
             Workspace.open(workspace),
             settings=settings,
             out=out,

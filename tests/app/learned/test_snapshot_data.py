@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from odscen.app.generation import generate
 from odscen.app.generators import GeneratorDoor
 from odscen.app.learned.evaluation import (
     BINNED,
@@ -24,7 +25,6 @@ from odscen.app.learned.snapshot_data import (
     town_of,
 )
 from odscen.app.maps import load_map
-from odscen.app.scenarios import generate
 from odscen.base.errors import InputError
 from odscen.learning.reference.model_training import TrainingSettings
 from odscen.learning.traffic_snapshots import SignalAhead

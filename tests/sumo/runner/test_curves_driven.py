@@ -9,8 +9,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+from odscen.app.generation import generate
 from odscen.app.running.runs import run
-from odscen.app.scenarios import generate, read_scenario
+from odscen.app.scenarios import read_scenario
 from odscen.figures.measures.motion import implausible
 from odscen.maps.store import Workspace
 from odscen.runs.run_settings import RunSettings

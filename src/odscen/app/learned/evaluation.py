@@ -267,9 +267,9 @@ def evaluate_scenarios(
         on = whole_map(workspace.map_for(name, mine[0].map_sha256))
         compared = _ComparedMap(on, scenes_of(workspace, mine), workspace)
         own = [scenario for scenario in scenarios if scenario.map.name == name]
-        lights = lights_at_start(on.loaded.sumo)
+        lights = [lights_at_start(on.loaded.sumo, scenario.signals) for scenario in own]
         scenes, off = zip(
-            *(scene_of_scenario(on, scenario, lights) for scenario in own), strict=True
+            *(scene_of_scenario(on, *pair) for pair in zip(own, lights, strict=True)), strict=True
         )
         made = _MadeTraffic(list(scenes), float(np.mean(off)), own)
         found += [compared.floor(mine), compared.quality(folder.name, made, run=run)]

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from odscen.app.maps import LoadedMap
+    from odscen.base.arrays import BoolArray, IntArray
     from odscen.base.given_files import GivenPath
     from odscen.lanegraph.graphs import MapGraph
     from odscen.learning.traffic_snapshots import LightView
@@ -331,7 +332,7 @@ def _judge_run(
     if run.counts["teleported"] > 0.02 * max(run.counts["inserted"], 1):
         return f"{run.counts['teleported']} vehicles were teleported", ()
     growth = stopped_growth(
-        _vehicles_of(run), start=settings.warm_up, middle=(settings.warm_up + settings.duration) / 2
+        vehicles_of(run), start=settings.warm_up, middle=(settings.warm_up + settings.duration) / 2
     )
     if growth > settings.growth_most:
         return f"a jam grows: {growth:.0%} more of the vehicles are stopped in the second half", ()
@@ -359,19 +360,41 @@ def snapshots_of(run: Run, loaded: LoadedMap, times: Sequence[float]) -> tuple[S
     InputError
         If no trajectories were recorded.
     """
-    rows = _vehicles_of(run)
-    logs = _light_logs(run)
+    rows = vehicles_of(run)
+    logs = light_logs(run)
     tree = _build_node_tree(loaded)
     return tuple(
         _make_snapshot(rows, time, tree, lights_at(loaded.sumo, logs, time)) for time in times
     )
 
 
-def _vehicles_of(run: Run) -> pl.DataFrame:
-    """Trajectories without pedestrians."""
+def vehicles_of(run: Run) -> pl.DataFrame:
+    """Take trajectories without those of pedestrians."""
     import polars as pl
 
     return run.trajectories().filter(pl.col("category") != str(Category.PEDESTRIAN))
+
+
+def nodes_under(loaded: LoadedMap, rows: pl.DataFrame) -> tuple[IntArray, BoolArray]:
+    """Find the node of the lane graph nearest to each body, and whether it is near enough.
+
+    Parameters
+    ----------
+    rows
+        ``x``, ``y`` (m) and ``hdg`` (rad) of the centres of bodies.
+
+    Returns
+    -------
+    tuple
+        Nodes and flags, shape ``(V,)``.
+    """
+    return _nearest_nodes(_build_node_tree(loaded), rows)
+
+
+def _nearest_nodes(tree: Any, rows: pl.DataFrame) -> tuple[IntArray, BoolArray]:
+    points = _stack_poses(_PlacedBodies(rows["x"], rows["y"], rows["hdg"]))
+    far, node = tree.query(points) if len(points) else (np.empty(0), np.empty(0, dtype=np.int64))
+    return node.astype(np.int64), far < OFF_NODE
 
 
 def _build_node_tree(loaded: LoadedMap) -> Any:
@@ -396,14 +419,12 @@ def _make_snapshot(rows: pl.DataFrame, time: float, tree: Any, lights: LightView
     import polars as pl
 
     near = rows.filter((pl.col("time") > time - 0.01) & (pl.col("time") < time + 0.01))
-    points = _stack_poses(_PlacedBodies(near["x"], near["y"], near["hdg"]))
-    far, node = tree.query(points) if len(points) else (np.empty(0), np.empty(0, dtype=np.int64))
-    good = far < OFF_NODE
+    node, good = _nearest_nodes(tree, near)
     names = [str(category) for category in Category]
     category = np.array([names.index(category) for category in near["category"]], dtype=np.int64)
     braking = braking_of(rows, time, near["id"].to_list())
     speed = near["speed"].to_numpy().astype(np.float64)
-    return Snapshot(node[good].astype(np.int64), category[good], speed[good], braking[good], lights)
+    return Snapshot(node[good], category[good], speed[good], braking[good], lights)
 
 
 def braking_of(rows: pl.DataFrame, time: float, ids: Sequence[str]) -> Any:
@@ -428,7 +449,7 @@ def braking_of(rows: pl.DataFrame, time: float, ids: Sequence[str]) -> Any:
     )
 
 
-def _light_logs(run: Run) -> dict[str, LightLog]:
+def light_logs(run: Run) -> dict[str, LightLog]:
     import polars as pl
 
     from odscen.runs.layout import LIGHT_STATES_FILE

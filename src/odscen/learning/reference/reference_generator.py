@@ -243,7 +243,7 @@ class ReferenceGenerator:
             self._model, site, request.lights, allowed,
             spacing=graph.lanes.spacing, wanted=request.vehicles, lengths=lengths, rng=rng,
         )  # fmt: skip
-        desired = _draw_desired_speeds(traffic, site.limit[traffic.node], rng)
+        desired = draw_desired_speeds(traffic, site.limit[traffic.node], rng)
         goal = onward_goals(graph, request.roads, node=traffic.node, speed=traffic.speed, rng=rng)
         walkers = _draw_walkers(request, rng)
         rest = np.full(len(walkers), np.nan)
@@ -425,10 +425,16 @@ def _draw_columns(shares: FloatArray, rng: np.random.Generator) -> IntArray:
     return found
 
 
-def _draw_desired_speeds(
+def draw_desired_speeds(
     traffic: PlacedTraffic, limit: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
-    """Desired speeds, m/s: about the limit, never below the speed at departure."""
+    """Draw desired speeds, m/s: about the limit, never below the speed at departure.
+
+    Parameters
+    ----------
+    limit
+        Shape ``(V,)``, m/s.
+    """
     count = len(traffic.node)
     mean, spread, low, high = _FACTOR
     motor = np.clip(rng.normal(mean, spread, count), low, high) * limit

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from odscen.base.categories import Category
     from odscen.lanegraph.graphs import MapGraph
+    from odscen.scenario.document.signals_document import Signals
     from odscen.scenario.placing.region import Usable
     from odscen.scenario.sampling.sampler import WantedUsers
 
@@ -162,9 +163,9 @@ class NamedPlacer(Protocol):
     """Places actors by a generator that is known by its name."""
 
     def __call__(
-        self, name: str, options: Mapping[str, bool | float | str], seed: int
+        self, name: str, options: Mapping[str, bool | float | str], seed: int, signals: Signals
     ) -> Callable[[Region, WantedUsers], tuple[Actor, ...]]:
-        """Make the function that places them in a region."""
+        """Make the function that places them in a region whose lights are run by ``signals``."""
 
 
 @edit("Fill the region")
@@ -207,7 +208,7 @@ def fill_roi(
     seed = scenario.seed if seed is None else seed
     place = None
     if generator is not None and place_by is not None:
-        place = place_by(generator, options or {}, seed)
+        place = place_by(generator, options or {}, seed, scenario.signals)
     elif generator is not None or options:
         raise ScenarioError("there is no generator here to be named, or to have options")
     crowd = sample_scenario(

@@ -6,6 +6,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.learning.traffic_snapshots import LightView, SignalAhead, no_lights
+from odscen.scenario.document.signals_document import Signals
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table.table import SumoLight
     from odscen.sumo.realize.sumo_map import SumoMap
 
+AS_THE_MAP = Signals()
 LightLog = list[tuple[float, str]]
 """Times (s) and states of one light, from each time on."""
 
@@ -47,15 +49,26 @@ def lights_at(sumo_map: SumoMap, logs: Mapping[str, LightLog], time: float) -> L
     return view
 
 
-def lights_at_start(sumo_map: SumoMap) -> LightView:
-    """Find what lights show when a run begins that leaves the programs of the map as they are.
+def lights_at_start(sumo_map: SumoMap, signals: Signals = AS_THE_MAP) -> LightView:
+    """Find what lights show when a run begins whose programs are those of the map.
 
     For how long they have shown it is counted as if the programs had been running before.
+
+    Parameters
+    ----------
+    signals
+        Of a scenario; their offsets count, other changes of programs are not looked at.
     """
-    return lights_at(sumo_map, {light.id: _before_start(light) for light in sumo_map.lights}, 0.0)
+    offsets = {timing.junction: timing.offset for timing in signals.junctions if timing.offset}
+    logs = {}
+    for light in sumo_map.lights:
+        names = (light.id, *map(str, light.junctions))
+        offset = next((offsets[name] for name in names if name in offsets), light.offset)
+        logs[light.id] = _before_start(light, offset)
+    return lights_at(sumo_map, logs, 0.0)
 
 
-def _before_start(light: SumoLight) -> LightLog:
+def _before_start(light: SumoLight, offset: float) -> LightLog:
     """States of one cycle up to second 0, and what is shown then.
 
     SUMO's programs are at ``time - offset`` of their cycle.
@@ -65,7 +78,7 @@ def _before_start(light: SumoLight) -> LightLog:
     cycle = ends[-1] if ends else 0.0
     if cycle <= 0.0:
         return [(0.0, phases[0].state)] if phases else []
-    place = -light.offset % cycle
+    place = -offset % cycle
     starts = [0.0, *ends[:-1]]
     log = [(start - place, phase.state) for start, phase in zip(starts, phases, strict=True)]
     log += [(time - cycle, state) for time, state in log]
