@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -10,9 +11,14 @@ from playwright.sync_api import expect
 
 from tests.browser.conftest import PATIENCE
 from tests.browser.pages import OdscenPage
+from tests.maps.importers.test_openstreetmap import EXTRACTS, PLACES, crossroads
 from tools import page as tool
 
 MOST_CLICKS = 20
+FEWEST_FROM_OSM = 9
+"""Clicks from an .osm file to a run."""
+REAL = ("4way-crossing", "West-Oakland.osm")
+"""Extracts of real places that are added, where they are there."""
 
 # What comes later, such as the server's sentences in another language, is not in the first load.
 _SHOWN = """
@@ -88,6 +94,53 @@ def test_a_newcomer_runs_a_scenario_within_twenty_clicks_and_types_nothing(
     user.result.get_by_role("button", name="Back to the editor").click()
     user.wait_for_editor()
     assert user.document()["actors"] == actors
+
+
+CROSSROADS = crossroads(
+    {"name": "Main Street", "sidewalk": "both", "lanes": "2"},
+    node_tags={1: {"highway": "traffic_signals"}},
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "place",
+    ["crossroads.osm", *(file.name for file in EXTRACTS if file.stem in REAL)],
+)
+def test_a_newcomer_gets_from_an_osm_file_of_his_town_to_a_run_within_twenty_clicks(
+    place: str, open_page: Callable[..., OdscenPage], tmp_path: Path
+) -> None:
+    """Nothing is typed: the file is chosen, the map taken as a whole, filled and run."""
+    file = tmp_path / "place.osm" if place.startswith("crossroads") else PLACES / place
+    if file.parent == tmp_path:
+        file.write_bytes(CROSSROADS)
+    root = tmp_path / "workspace"
+    root.mkdir()
+    with tool.served(root) as server:
+        user = open_page(server.url, tour=True)
+        user.open_catalogue()
+        with user.page.expect_file_chooser() as chooser:
+            user.page.get_by_role("button", name="Choose a file").click()
+        chooser.value.set_files(file)
+        expect(user.maps).to_have_count(1, timeout=8 * PATIENCE)
+        user.page.get_by_role("button", name=re.compile("^New scenario on")).click()
+        user.wait_for_editor()
+        user.close_tour()
+        with user.changing():
+            user.page.get_by_role("button", name="Take the whole map").click()
+        user.step("Road users").click()
+        user.page.get_by_role("button", name="Fill the whole region").click()
+        with user.changing():
+            user.page.get_by_role("button", name="Fill the region", exact=True).click()
+        assert len(user.document()["actors"]) >= 5
+        user.step("Run").click()
+        user.run.click()
+        user.wait_until_moving()
+        actions = user.actions()
+        assert actions["key"] == 0
+        assert actions["pointer"] <= FEWEST_FROM_OSM <= MOST_CLICKS
+        user.choose_speed("As fast")
+        expect(user.result).to_contain_text("finished", timeout=8 * PATIENCE)
 
 
 @pytest.mark.parametrize("locale", ["en-GB", "de-DE"])
