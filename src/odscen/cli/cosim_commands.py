@@ -182,6 +182,14 @@ def cosim(
     video: Annotated[
         Path | None, typer.Option(help="Film from above: a file ending in .mp4, .mkv or .webm.")
     ] = None,
+    sheet: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            max=100,
+            help="Instants of a page in the run's folder: the plan beside what the camera saw.",
+        ),
+    ] = 0,
     picture_rate: Annotated[
         float, typer.Option(min=0.1, max=60, help="Pictures per simulated second.")
     ] = 10.0,
@@ -282,12 +290,14 @@ def cosim(
         wheel_calls=wheel_calls,
         sensors=_read_sensors(sensor),
         hook=None if hook is None else load_hook(hook),
-        pictures=Wish(frames, video, picture_rate),
+        pictures=Wish(frames, video, sheet, picture_rate),
     )
     if native and follow:
         raise InputError(
             "--native drives with the Traffic Manager, which has to tick: leave --follow out"
         )
+    if native and sheet:
+        raise InputError("--native drives without a plan to look at beside it: leave --sheet out")
     if native and settings.behaviour is not None:
         raise InputError("--native drives with the Traffic Manager: leave --behaviour out")
     if native:

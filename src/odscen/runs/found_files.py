@@ -56,6 +56,7 @@ def found_files(folder: Path) -> dict[str, str]:
         "actors": layout.ACTORS_FILE,
         "report": layout.REPORT_FILE,
         "parity": layout.PARITY_FILE,
+        "picture_sheet": layout.PICTURE_SHEET_FILE,
         "parity_figures": layout.PARITY_FIGURES_FILE,
         "log": layout.LOG_FILE,
     }

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import math
+import re
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from odscen.carla.mirror.cosim import cosim
@@ -58,3 +61,39 @@ def test_the_camera_is_above_the_ego_in_every_tick_and_all_pictures_are_counted(
     written = len(list((tmp_path / "frames").iterdir()))
     assert written == report.pictures - report.pictures_dropped
     assert math.isclose(written, 60, abs_tol=12)
+
+
+def test_a_sheet_has_the_plan_beside_what_the_camera_saw_in_the_same_tick(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    path = scenario_of(workspace, WEAVE, [EGO], tmp_path)
+    with StandIn(WEAVE, map_name=WEAVE.stem) as server:
+        result, _ = cosim(
+            workspace,
+            path,
+            CosimOptions(
+                Address(server.host, server.port),
+                tick=TICK,
+                pictures=Wish(sheet=4, width=64, height=36),
+            ),
+            out=tmp_path,
+            settings=RunSettings(until=8.0, step_length=STEP),
+        )
+    page = result.folder / "picture_sheet.html"
+    text = page.read_text(encoding="utf-8")
+    times = [float(one) for one in re.findall(r"<h2>([\d.]+) s</h2>", text)]
+    assert len(times) == 4
+    assert times[-1] - times[0] >= 5.0
+    steps = np.diff(times)
+    assert steps.max() <= 2.0 * steps.min()
+    driven = result.trajectories().filter(pl.col("id") == "ego").sort("time")
+    boxes = re.findall(r'viewBox="(-?\d+) (-?\d+) (\d+) (\d+)" class="run-map"', text)
+    for time, box in zip(times, boxes, strict=True):
+        left, top, wide, tall = (float(one) / 100.0 for one in box)
+        assert (wide, tall) == (120.0, pytest.approx(67.5, abs=0.01))
+        where = [np.interp(time, driven["time"], driven[name]) for name in ("x", "y")]
+        # The camera is where the tick before has shown the ego to be.
+        assert math.hypot(left + wide / 2 - where[0], -top - tall / 2 - where[1]) <= 0.1
+    assert text.count('class="c-car body"') == 4
+    pictures = re.findall(r'src="data:image/jpeg;base64,([^"]+)"', text)
+    assert [base64.b64decode(one)[:2] for one in pictures] == [b"\xff\xd8"] * 4

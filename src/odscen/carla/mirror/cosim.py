@@ -15,6 +15,7 @@ from odscen.carla.mirror.cosim_options import CosimOptions
 from odscen.carla.mirror.cosim_report import CosimReport
 from odscen.carla.mirror.mirrored import MirroredPlan
 from odscen.carla.mirror.parity_recorder import StateRecorder
+from odscen.carla.mirror.sheet_recorder import SheetRecorder
 from odscen.carla.mirror.step_clock import FollowedTicks, OwnTicks
 from odscen.carla.mirror.step_show import StepShow
 from odscen.carla.mirror.tick_hook import ShownActors, call_hook
@@ -27,6 +28,7 @@ from odscen.carla.server.server_map import ensure_map
 from odscen.convert.lane_table.light_heads import SignalHeads
 from odscen.convert.lane_table.table_json import table_from_json
 from odscen.drawing.map_drawing import MapDrawing
+from odscen.reports.picture_sheet import render_picture_sheet
 from odscen.runs import layout
 from odscen.runs.new_run import refuse_finished_run
 from odscen.runs.reporter import SILENT
@@ -80,17 +82,14 @@ class RunWitnesses:
         self._server, self._on, self._plan, self._mirrored = server, on, plan, mirrored
         self._recorder: StateRecorder | None = None
         self._camera: Camera | None = None
+        self._sheet: SheetRecorder | None = None
         self._sensors: SensorRecording | None = None
         self._seen = Path()
         if options.parity:
             self._recorder = StateRecorder(plan, mirrored.blueprints, mirrored.shapes)
             show.witnesses.append(partial(show.record, recorder=self._recorder))
         if options.pictures.any or options.on_picture:
-            view = first_view(plan, options.pictures)
-            self._camera = stack.enter_context(
-                watch_from_above(server, view, options.pictures, options.on_picture)
-            )
-            show.views.append(self._above_ego)
+            self._put_up_camera(stack, options, show)
         if options.sensors:
             self._attach_sensors(stack, folder, options, show)
         if options.hook is not None:
@@ -107,12 +106,20 @@ class RunWitnesses:
             If a sensor's file could not be written.
         """
         if self._recorder is not None:
-            drawing = MapDrawing.from_json(self._on.file("drawing").read_bytes())
-            self._recorder.write(folder, drawing)
+            self._recorder.write(folder, self._read_drawing())
+        if self._sheet is not None:
+            page = render_picture_sheet(
+                self._sheet.moments(), self._read_drawing(),
+                scenario=self._plan.scenario, shown_by="CARLA",
+            )  # fmt: skip
+            (folder / layout.PICTURE_SHEET_FILE).write_text(page, encoding="utf-8")
         if self._sensors is not None:
             self._sensors.close()
             if self._seen.is_dir():
                 shutil.move(self._seen, folder)
+
+    def _read_drawing(self) -> MapDrawing:
+        return MapDrawing.from_json(self._on.file("drawing").read_bytes())
 
     def conclude(self, report: CosimReport) -> None:
         """Fill in how much they have seen, when all has ended."""
@@ -120,6 +127,23 @@ class RunWitnesses:
             report.pictures, report.pictures_dropped = self._camera.taken, self._camera.dropped
         if self._sensors is not None:
             report.sensors = dict(self._sensors.counts)
+
+    def _put_up_camera(self, stack: ExitStack, options: CosimOptions, show: StepShow) -> None:
+        wish = options.pictures
+        view = first_view(self._plan, wish)
+        sheet = (
+            SheetRecorder(self._server, self._plan, view, wanted=wish.sheet) if wish.sheet else None
+        )
+        self._sheet = sheet
+        self._camera = stack.enter_context(
+            watch_from_above(
+                self._server, view, wish, options.on_picture,
+                keep=None if sheet is None else sheet.take,
+            )
+        )  # fmt: skip
+        show.views.append(self._above_ego)
+        if sheet is not None:
+            show.hooks.append(sheet.ticked)
 
     def _attach_sensors(
         self, stack: ExitStack, folder: Path, options: CosimOptions, show: StepShow
@@ -143,6 +167,12 @@ class RunWitnesses:
 
     def _above_ego(self, shown: Step) -> dict[int, ActorPlace]:
         """Where the camera is to be in a tick that shows this."""
+        places = self._camera_places(shown)
+        if self._sheet is not None:
+            self._sheet.look(shown, places)
+        return places
+
+    def _camera_places(self, shown: Step) -> dict[int, ActorPlace]:
         camera = self._camera
         if camera is None:
             return {}

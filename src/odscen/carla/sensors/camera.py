@@ -176,9 +176,19 @@ def open_camera(
 
 @contextmanager
 def watch_from_above(
-    server: Server, view: View, wish: Wish, on_picture: Callable[[bytes], None] | None
+    server: Server,
+    view: View,
+    wish: Wish,
+    on_picture: Callable[[bytes], None] | None,
+    *,
+    keep: Callable[[Picture], None] | None = None,
 ) -> Iterator[Camera]:
     """Put a camera up whose pictures are written as wished, and reported as JPEG.
+
+    Parameters
+    ----------
+    keep
+        Called with each picture, in a thread of its own.
 
     Raises
     ------
@@ -191,6 +201,8 @@ def watch_from_above(
 
         def take(picture: Picture) -> None:
             write(picture)
+            if keep is not None:
+                keep(picture)
             if on_picture is not None:
                 on_picture(still(picture, "jpeg"))
 

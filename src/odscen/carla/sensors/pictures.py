@@ -61,10 +61,13 @@ class Wish:
         Folder for ``000001.png``, ``000002.png`` and so on.
     film
         File; its ending says which kind: ``.mp4``, ``.mkv`` or ``.webm``.
+    sheet
+        Instants of a page in the run's folder that has the plan beside what the camera saw.
     """
 
     frames: Path | None = None
     film: Path | None = None
+    sheet: int = 0
     rate: float = 10.0
     width: int = 960
     height: int = 540
@@ -72,7 +75,7 @@ class Wish:
     @property
     def any(self) -> bool:
         """Whether any file is wanted."""
-        return self.frames is not None or self.film is not None
+        return self.frames is not None or self.film is not None or self.sheet > 0
 
     def check(self) -> None:
         """Refuse what cannot be done before anything is begun.
