@@ -12,6 +12,7 @@ import shutil
 import struct
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from lxml import etree, html
 
 from odscen.app.exchange.exports import export, export_run, export_runs
 from odscen.app.exchange.recorded_traffic import read_recorded_traffic
+from odscen.app.running import reports
 from odscen.app.running.batches import run_many
 from odscen.base.errors import DamagedError, InputError
 from odscen.formats import list_formats
@@ -636,8 +638,36 @@ def test_the_page_needs_nothing_else_and_runs_only_its_own_scripts(exports: Path
     allowed = set(re.findall(r"'sha256-([^']+)'", policy))
     scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
     digests = {base64.b64encode(hashlib.sha256(one.encode()).digest()).decode() for one in scripts}
-    assert len(scripts) == 2
+    built = (files("odscen") / reports.SCENERY_SCRIPT).is_file()
+    assert len(scripts) == 2 + built
     assert allowed == digests
+
+
+def test_the_page_has_the_ground_of_three_dimensions_around_what_moved(
+    workspace: Workspace, run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    script = tmp_path / "scenery.js"
+    script.write_text("/* draws */", encoding="utf-8")
+    monkeypatch.setattr(reports, "SCENERY_SCRIPT", script)  # as if the page were built
+    rows = run.trajectories()
+    export_run(workspace, run.folder, tmp_path / "out", to="html")
+    page = _file(tmp_path, "out/*.html").read_text(encoding="utf-8")
+    data = re.search(r'<script type="application/json" id="replay-ground">(.+?)</script>', page)
+    assert data is not None
+    ground = json.loads(data[1])
+    assert "/* draws */" in page
+    low_x, low_y, high_x, high_y = ground["drawing"]["bounds"]
+    assert low_x < rows["x"].min() < rows["x"].max() < high_x
+    assert low_y < rows["y"].min() < rows["y"].max() < high_y
+    nodes, heights = ground["nodes"], ground["heights"]
+    assert len(nodes["x"]) == len(nodes["hdg"]) == len(heights["z"])
+    assert len(nodes["walks"]["x"]) == len(heights["walks"])
+    assert ground["weather"]["sun_altitude_angle"] > 0
+    monkeypatch.setattr(reports, "SCENERY_SCRIPT", tmp_path / "not-built.js")
+    export_run(workspace, run.folder, tmp_path / "plain", to="html")
+    plain = _file(tmp_path, "plain/*.html").read_text(encoding="utf-8")
+    assert "replay-view" not in plain
+    assert "replay-view" in page
 
 
 def test_a_long_replay_keeps_every_nth_instant(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:

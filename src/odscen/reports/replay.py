@@ -4,23 +4,46 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from odscen.base.markup import Markup, element
 from odscen.drawing.svg_layers import LayerOptions, map_layers
+from odscen.reports.replay_ground import ground_values
 from odscen.reports.report_maps import fitted_view, view_box
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import polars as pl
 
     from odscen.base.arrays import Bounds
     from odscen.convert.lane_table.table import SumoLight
     from odscen.drawing.map_drawing import MapDrawing
+    from odscen.lanegraph.graphs import MapGraph
     from odscen.records.run_plan import PlannedActor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scenery:
+    """What a replay in three dimensions needs beside the drawing of the map.
+
+    Attributes
+    ----------
+    script
+        Draws it; part of the built page.
+    graph
+        Of the map, with heights.
+    weather
+        Its parameters, by the names that CARLA has for them.
+    """
+
+    script: str
+    graph: MapGraph
+    weather: Mapping[str, float]
+
 
 MOST_PLACES = 250_000
 """Places of road users at most; of more, every n-th instant is kept, as the page says."""
@@ -41,6 +64,7 @@ def replay_values(
     clock: float = 0.0,
     lights: Sequence[SumoLight] = (),
     states: pl.DataFrame | None = None,
+    scenery: Scenery | None = None,
 ) -> dict[str, Any] | None:
     """Values of the block ``replay`` of a report; ``None`` if nobody moved.
 
@@ -60,6 +84,8 @@ def replay_values(
         Of the map.
     states
         What they showed, as :func:`odscen.runs.recorded.read_light_states` gives it.
+    scenery
+        With it, and a drawing, the run can be seen in three dimensions, too.
     """
     import polars as pl
 
@@ -85,12 +111,14 @@ def replay_values(
     if not pieces:
         return None
     bounds = _choose_view(kept, drawing)
-    ground = None
+    ground = below = None
     if drawing is not None:
         beside = 0.35 * (bounds[2] - bounds[0])
         wider = (bounds[0] - beside, bounds[1] - beside, bounds[2] + beside, bounds[3] + beside)
         options = LayerOptions(symbol_size=1.2, prefix="replay-")
         ground = element("g", map_layers(drawing.clipped(wider), options), class_="map")
+        if scenery is not None:
+            below = _write_json(ground_values(drawing, scenery.graph, scenery.weather, wider))
     svg = element(
         "svg", ground, viewBox=view_box(bounds), id="replay-map", aria_hidden="true",
         preserveAspectRatio="xMidYMid meet",
@@ -100,15 +128,22 @@ def replay_values(
         "begin": round(first, 3), "step": round(step * every, 6), "frames": frames,
         "clock": clock, "pieces": pieces, "lights": _list_lights(lights, states),
     }  # fmt: skip
-    text = json.dumps(data, separators=(",", ":"), sort_keys=True).replace("<", "\\u003c")
     return {
         "drawing": svg,
-        "data": Markup(text),
+        "data": _write_json(data),
+        "ground": below,
+        "scripts": [Markup(scenery.script)] if scenery is not None and below else [],
         "users": len({piece["id"] for piece in pieces}),
         "every": step * every,
         "thinned": every > 1,
         "lights": bool(data["lights"]),
     }
+
+
+def _write_json(values: Mapping[str, Any]) -> Markup:
+    """JSON that can stand in a script of a page."""
+    text = json.dumps(values, separators=(",", ":"), sort_keys=True)
+    return Markup(text.replace("<", "\\u003c"))
 
 
 def _choose_view(rows: pl.DataFrame, drawing: MapDrawing | None) -> Bounds:
@@ -169,6 +204,7 @@ def _split_pieces(user: PlannedActor, own: pl.DataFrame) -> list[dict[str, Any]]
         {
             "id": user.id, "category": user.category, "length": round(user.length, 2),
             "width": round(user.width, 2), "frame": int(numbers[0]),
+            **({"ego": True} if user.ego else {}),
             "moves": np.diff(part, axis=0, prepend=0).ravel().tolist(),
         }
         for numbers, part in zip(np.split(frame, breaks), np.split(places, breaks), strict=True)

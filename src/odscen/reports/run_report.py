@@ -184,7 +184,7 @@ def render_report(
             head=_head_values(title, plan, summary, usability),
             scene=scene,
             replay=replay,
-            scripts=[PAGE_SCRIPT, REPLAY_SCRIPT] if replay else [PAGE_SCRIPT],
+            scripts=[PAGE_SCRIPT, *([REPLAY_SCRIPT, *replay["scripts"]] if replay else [])],
             brief=_brief_values(
                 values,
                 usability,

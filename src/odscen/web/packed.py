@@ -12,6 +12,7 @@ import orjson
 from starlette.responses import Response
 
 from odscen.app.maps import load_map
+from odscen.lanegraph.node_heights import node_heights
 from odscen.web.wire.media_types import Responses
 
 if TYPE_CHECKING:
@@ -49,12 +50,6 @@ def answer(request: Request, packed: PackedAnswer) -> Response:
     else:
         content = gzip.decompress(content)
     return Response(content, media_type="application/json", headers=headers)
-
-
-_FLAT = 0.005
-"""Metres between the highest and the lowest node of lanes of a map that is flat."""
-_KERB = 0.3
-"""Metres by which its walks may lie above these."""
 
 
 @lru_cache(maxsize=8)
@@ -122,11 +117,7 @@ def graph_columns(entry: MapEntry) -> dict[str, Any]:
 @lru_cache(maxsize=8)
 def packed_heights(entry: MapEntry) -> PackedAnswer:
     """Heights of the nodes of a map's graphs, which only a view in three dimensions needs."""
-    graph = load_map(entry).sumo.graph
-    lanes, walks = graph.lanes.z, graph.walks.z
-    flat = np.ptp(lanes) < _FLAT and (len(walks) == 0 or np.abs(walks - lanes[0]).max() < _KERB)
-    if flat:
-        lanes = walks = np.empty(0)
+    lanes, walks = node_heights(load_map(entry).sumo.graph)
     columns = {"z": np.round(lanes, 3), "walks": np.round(walks, 3)}
     return pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY))
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import logging
 from contextlib import nullcontext
 from functools import lru_cache
+from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import polars as pl
 
 from odscen.app.maps import load_map
+from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, NotFoundError, in_file
 from odscen.base.given_files import as_path
 from odscen.base.stored_files import tables
@@ -30,7 +32,7 @@ from odscen.records.row_text import rounded
 from odscen.records.run_events import events_from_json
 from odscen.records.run_plan import Plan
 from odscen.reports.place_names import NO_NAMES, place_names
-from odscen.reports.replay import replay_values
+from odscen.reports.replay import Scenery, replay_values
 from odscen.reports.report_maps import place_shapes
 from odscen.reports.report_sections import FEW
 from odscen.reports.report_signals import LightsOfRun
@@ -65,6 +67,8 @@ if TYPE_CHECKING:
     from odscen.maps.store import Workspace
     from odscen.reports.place_names import PlaceNames
 
+SCENERY_SCRIPT = "web/static/replay/scenery.js"
+"""Of the built page, below the package: draws a replay in three dimensions."""
 REPORT_ROWS = 2_000_000
 """Rows of trajectories that a report is made from at most; a day of a town has far more."""
 
@@ -127,7 +131,19 @@ def replay_page(workspace: Workspace, folder: Path, recorded: RecordedRun) -> st
     """
     summary = _read_completed_summary(folder)
     loaded = load_map(workspace.map_for(summary["map"], summary["map_sha256"]))
-    return _read_page(folder, summary, loaded, None, None, recorded)
+    scenery = _read_scenery(workspace, folder, loaded)
+    return _read_page(folder, summary, loaded, None, None, recorded, scenery)
+
+
+def _read_scenery(workspace: Workspace, folder: Path, loaded: LoadedMap) -> Scenery | None:
+    """What shows the run in three dimensions; ``None`` where the page is not built."""
+    script = files("odscen") / SCENERY_SCRIPT
+    if not script.is_file():
+        return None
+    environment = read_scenario(folder / layout.SCENARIO_FILE).environment
+    preset = workspace.assets().presets.get(environment.preset)
+    weather = {**(preset.parameters if preset else {}), **environment.parameters}
+    return Scenery(script.read_text(encoding="utf-8"), loaded.sumo.graph, weather)
 
 
 def _read_page(
@@ -137,13 +153,16 @@ def _read_page(
     corridor: Corridor | None,
     data: RunData | None,
     recorded: RecordedRun | None = None,
+    scenery: Scenery | None = None,
 ) -> str:
     with in_file(str(folder)), tables(str(folder)):
         own = folder / layout.FIGURES_FOLDER
         figures = read_tables(own) if data is None else data.traffic
         motion = read_motion(own) if data is None else data.motion
         stations = read_stations(own) if data is None else data.stations
-        return _render_page(folder, summary, loaded, corridor, figures, stations, motion, recorded)
+        return _render_page(
+            folder, summary, loaded, corridor, figures, stations, motion, recorded, scenery
+        )
 
 
 def _render_page(
@@ -155,6 +174,7 @@ def _render_page(
     stations: pl.DataFrame | None,
     motion: pl.DataFrame | None,
     watched: RecordedRun | None = None,
+    scenery: Scenery | None = None,
 ) -> str:
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8", errors="replace")
@@ -180,6 +200,7 @@ def _render_page(
             clock=plan.clock,
             lights=loaded.sumo.lights,
             states=watched.states,
+            scenery=scenery,
         )
     return render_report(
         summary,

@@ -47,23 +47,39 @@
     return low ? light.states[low - 1] : null;
   };
   // Across the lane is stop, along it is go: to be told without colours, too.
-  const drawHeads = (context, place, scale, seconds) => {
-    const long = Math.max(260 * scale, 7);
-    const thick = Math.max(70 * scale, 2.5);
+  const headsAt = (seconds) => {
+    const heads = [];
     for (const light of data.lights) {
       const state = stateAt(light, seconds);
       if (state === null) continue;
-      for (const [x, y, heading, letters] of light.heads) {
+      for (const [x, y, hdg, letters] of light.heads) {
         const seen = letters.map((letter) => SHOWN[state[letter]]);
         const shown = ["green", "yellow", "red"].find((colour) => seen.includes(colour));
-        if (!shown) continue;
-        place(x, y, heading);
-        context.fillStyle = COLOURS[shown];
-        if (shown === "green") context.fillRect(0, -thick / 2, long, thick);
-        else context.fillRect(-thick / 2, -long / 2, thick, long);
+        if (shown) heads.push({ x: x / 100, y: y / 100, hdg, walk: false, shown });
       }
     }
+    return heads;
   };
+  const drawHeads = (context, place, scale, seconds) => {
+    const long = Math.max(260 * scale, 7);
+    const thick = Math.max(70 * scale, 2.5);
+    for (const { x, y, hdg, shown } of headsAt(seconds)) {
+      place(100 * x, 100 * y, hdg);
+      context.fillStyle = COLOURS[shown];
+      if (shown === "green") context.fillRect(0, -thick / 2, long, thick);
+      else context.fillRect(-thick / 2, -long / 2, thick, long);
+    }
+  };
+  // A view in three dimensions gets each moment from here.
+  const replay = (window.odscenReplay = {
+    stage: holder,
+    draw: () => draw(),
+    view: () => ({
+      x: (view[0] + view[2] / 2) / 100,
+      y: -(view[1] + view[3] / 2) / 100,
+      scale: 100 * Math.min(holder.clientWidth / view[2], holder.clientHeight / view[3]),
+    }),
+  });
   const draw = () => {
     const ratio = window.devicePixelRatio || 1;
     const [wide, high] = [holder.clientWidth, holder.clientHeight];
@@ -87,12 +103,16 @@
     };
     drawHeads(context, place, scale, data.begin + time * data.step);
     let shown = 0;
+    const bodies = [];
     for (const piece of data.pieces) {
       if (time < piece.frame || time > piece.last) continue;
       const row = (frame - piece.frame) * 3;
       const next = Math.min(row + 3, piece.places.length - 3);
       const between = (index) => piece.places[row + index] * (1 - share) + piece.places[next + index] * share;
-      place(between(0), between(1), between(2) / 100);
+      const [x, y, hdg] = [between(0), between(1), between(2) / 100];
+      place(x, y, hdg);
+      const { category, ego, length: long, width: wide } = piece;
+      bodies.push({ category, ego: ego === true, x: x / 100, y: y / 100, hdg, length: long, width: wide });
       const length = Math.max(piece.length * 100 * scale, 4);
       const width = Math.max(piece.width * 100 * scale, 3);
       context.fillStyle = colourOf(piece.category);
@@ -107,6 +127,7 @@
     bar.setAttribute("aria-valuetext", words);
     holder.dataset.shown = String(shown);
     holder.dataset.time = String(time * data.step);
+    replay.seen?.(bodies, headsAt(data.begin + time * data.step));
   };
   const name = () => {
     play.textContent = running ? "Pause" : "Play";
