@@ -15,7 +15,7 @@ from playwright.sync_api import expect
 
 from odscen.maps.store import Workspace
 from tools import page as tool
-from tools.screenshots import editor_scenes, run_scenes, scenarios, task_scenes
+from tools.screenshots import editor_scenes, guide_scenes, run_scenes, scenarios, task_scenes
 from tools.screenshots.camera import Scene, Studio
 
 SCENES: dict[str, Scene] = {
@@ -35,6 +35,8 @@ SCENES: dict[str, Scene] = {
         run_scenes.results,
         run_scenes.time_of_a_run,
         run_scenes.interrupted,
+        guide_scenes.expert,
+        guide_scenes.engineer,
         editor_scenes.sweeps,
         editor_scenes.studies,
         editor_scenes.exchange,

@@ -28,6 +28,7 @@ WEAVE = "motorway_weave"
 SAMPLED = f"{MAP}-0005"
 COUNTED, LONG, LIT, RULED, TIMED = "morning", "night", "signals", "mid-block", "timed"
 SWEPT, STUDY, INFLOW, TOWN, ROADWORKS = "cut-in", "rain", "study-area", "evening", "roadworks"
+PEAK = "peak"
 
 
 def prepare(workspace: Workspace) -> None:
@@ -36,7 +37,7 @@ def prepare(workspace: Workspace) -> None:
         workspace.add_map(path)
     sampled = GenerationSettings(map_name=MAP, seed=5, fill=0.15, roi_segments=7)
     generate(workspace, settings=sampled)
-    for save in (counted, long, lit, ruled, timed, swept, inflow, town, study):
+    for save in (counted, long, lit, ruled, timed, swept, inflow, town, peak, study):
         save(workspace)
 
 
@@ -66,6 +67,14 @@ def town(workspace: Workspace) -> None:
         scenario = edits.new_scenario(graph, name=name, roi=graph.segments.ids)
         scenario = edits.set_background(scenario, graph, background="others", per_km=10, mix=mix)
         _save(workspace, name, edits.set_simulation(scenario, duration=600.0))
+
+
+def peak(workspace: Workspace) -> None:
+    """Save a scenario of a quarter of an hour with traffic at a light."""
+    graph = load_map(workspace.map(SMALL)).sumo.graph
+    scenario = edits.new_scenario(graph, name=PEAK, roi=graph.segments.ids)
+    scenario = edits.set_background(scenario, graph, background="others", trips=400)
+    _save(workspace, PEAK, edits.set_simulation(scenario, duration=900.0))
 
 
 def counted(workspace: Workspace) -> None:
