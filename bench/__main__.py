@@ -17,6 +17,8 @@ ALL = (
     "map_refusals",
     "map_meaning",
     "netconvert_maps",
+    "osm_converters",
+    "osm_elements",
     "capacity",
     "saturation",
     "motion",
