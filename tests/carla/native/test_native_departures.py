@@ -49,6 +49,8 @@ def test_departures_are_within_a_tick_of_the_plan_and_cost_no_ticks(
             out=tmp_path / "runs",
         )
         ticks = server.calls()["tick_cue"]
+    # A client that has waited too long is told from a run without departures.
+    assert result.known.get("error") is None
     events = json.loads((result.folder / "events.json").read_text())["events"]
     late = {
         event["actor"]: event["time"] - DEPARTS[event["actor"]]

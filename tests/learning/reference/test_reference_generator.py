@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 
 import numpy as np
 import pytest
@@ -103,6 +104,19 @@ def test_more_are_stopped_before_a_red_light_of_a_junction_than_before_a_green_o
     red, green = stopped(SignalAhead.RED), stopped(SignalAhead.GREEN)
     assert red > 0.2
     assert red > 2.0 * green
+
+
+def test_a_road_without_a_junction_with_ten_vehicles_is_said_to_be_unlike_the_data(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    ReferenceGenerator().fill(GRAPH, request(2), np.random.default_rng(0))
+    assert not caplog.records
+    for seed in range(3):
+        ReferenceGenerator().fill(GRAPH, request(10), np.random.default_rng(seed))
+    assert {record.name for record in caplog.records} == {"odscen"}
+    times = [float(re.findall(r"traffic ([\d.]+) times", one)[0]) for one in caplog.messages]
+    assert times
+    assert all(2.7 <= time <= 8.0 for time in times)
 
 
 def test_nobody_is_placed_where_nobody_is_wanted() -> None:

@@ -7,6 +7,7 @@ which it is on the wrong lane.
 
 from __future__ import annotations
 
+import logging
 from functools import cache, lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, NamedTuple
@@ -199,6 +200,12 @@ BACK = 0.6
 """Share of the last step of the wish that the next may be, if it goes the other way."""
 DENSER = 1.0
 """By how much the feature of density is changed at most, to have as many as are wanted."""
+UNLIKE = 1.0
+"""Logarithm of how much denser traffic it is told of, from which on a map is unlike the data.
+
+On the towns of CARLA and on varied towns it is at most 0.5; mostly 1.1 to 2.0 where a motorway, or
+a road without a junction, is all that there is.
+"""
 MORE = 1.05
 """Share of the vehicles wanted that a pass may place at most; those too many are taken away."""
 SHARPNESS = 2.0
@@ -315,6 +322,13 @@ def place_traffic(
         most = most * BACK if step * last < 0.0 else most
         last = float(np.clip(step, -most, most))
         wish += last
+    if wish >= UNLIKE and wanted:
+        words = (
+            "the reference generator had to be asked for traffic %.1f times as dense as is wanted: "
+            "the map, or so much traffic on it, is unlike what it has learned from, and queues may "
+            "be without a reason; --warm-up 30 lets them dissolve"
+        )
+        logging.getLogger("odscen").warning(words, np.exp(wish))
     keep = np.sort(rng.permutation(len(best.node))[:wanted])
     return PlacedTraffic(best.node[keep], best.category[keep], best.speed[keep])
 
