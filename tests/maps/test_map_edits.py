@@ -260,3 +260,24 @@ def test_wrong_edits_are_refused_with_edit_field_and_value(text: str, problem: s
     with pytest.raises(InputError) as caught:
         read_edits(text)
     assert problem in str(caught.value)
+
+
+@pytest.mark.slow
+def test_a_newer_file_has_the_edits_of_a_map_under_another_name_and_the_map_stays(
+    tmp_path: Path,
+) -> None:
+    workspace = Workspace.open(tmp_path)
+    workspace.add_map_content(CROSSING, file="town.xodr", name="town")
+    limit = {"kind": "speed_limit", "at": place("2", 1, 60.0), "limit": 30}
+    before = workspace.mend_map("town", [limit]).read("xodr")
+    gone = {"kind": "remove_crosswalk", "at": place("4", 1, 121.0)}
+    newer = mend_map(CROSSING, check_edits([gone])).xodr
+    renewed = workspace.renew_map("town", newer, file="newer.xodr", out="town-2")
+    assert [row["fate"] for row in renewed.edit_rows()] == ["repaired"]
+    model = parse(renewed.read("xodr"))
+    assert model.roads[RoadId("2")].sections[0].lanes[1].speeds[0].max == pytest.approx(30 / 3.6)
+    assert len(crosswalks(model, RoadTable.of(model))) == 3
+    assert workspace.map("town").read("xodr") == before
+    with pytest.raises(InputError):
+        workspace.renew_map("town", b"no map", file="newer.xodr")
+    assert workspace.map("town").read("xodr") == before
