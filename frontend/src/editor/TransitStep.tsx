@@ -95,6 +95,7 @@ function NewStop({
   return (
     <Button
       variant="default"
+      className="wrapping"
       aria-pressed={active}
       onClick={() => (active ? pick.stop() : pick.start(NEW_STOP(), "node"))}
     >
