@@ -2,12 +2,15 @@ import { ActionIcon, Button, Card, Group, Text, Title, Tooltip } from "@mantine/
 
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
+import { lazy, Suspense } from "react";
 import type { MapInfo } from "../api/types";
 import { hashOf } from "../ui/address";
 import { IconTrash } from "../ui/icons";
 import { mapFacts, networkFact } from "../ui/words";
 import { lossWords } from "./losses";
-import { Preview } from "./Preview";
+
+/** What draws maps comes once there is one. */
+const Preview = lazy(async () => ({ default: (await import("./Preview")).Preview }));
 
 /** A map with its picture and what there is in it. */
 export function MapCard({
@@ -26,7 +29,9 @@ export function MapCard({
   const facts = [...mapFacts(map.statistics), ...networkFact(map.network)];
   return (
     <Card withBorder padding={0} className="card">
-      <Preview name={map.name} picture={map.preview} />
+      <Suspense fallback={<div className="card-picture" />}>
+        <Preview name={map.name} picture={map.preview} />
+      </Suspense>
       <div style={{ padding: "12px 16px 14px", display: "flex", flexDirection: "column", flex: 1 }}>
         <Group justify="space-between" wrap="nowrap">
           <Title order={2} size="h4" style={{ overflowWrap: "anywhere" }}>
