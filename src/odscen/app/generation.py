@@ -97,7 +97,7 @@ def generate(
                 usable.bodies,
                 seed,
                 lights=lights_at_start(loaded.sumo, signals),
-                drive=_driver(workspace, loaded, generator.warm_up, moment),
+                drive=_make_driver(workspace, loaded, generator.warm_up, moment),
             )
         scenario = sample_scenario(
             loaded.sumo.graph, config, seed=seed, name=title, usable=usable, place=place
@@ -111,7 +111,7 @@ def generate(
     return paths
 
 
-def _driver(
+def _make_driver(
     workspace: Workspace, loaded: LoadedMap, seconds: float, moment: float
 ) -> Callable[[Region, FillRequest, Sequence[Actor]], Fill | None] | None:
     """What drives traffic before a scenario begins; ``None`` where nothing is to."""

@@ -17,13 +17,14 @@ from odscen.app.running.runs import check_run
 from odscen.base.atomic_folders import scratch_folder
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.learning.fill import VEHICLES, Fill
+from odscen.learning.fill import VEHICLES
 from odscen.learning.reference.reference_generator import (
-    NO_GOAL,
+    NOBODY,
     PlacedTraffic,
     draw_desired_speeds,
-    names_of,
+    fill_with_walkers,
     onward_goals,
+    road_limits,
 )
 from odscen.runs.recording import Recording
 from odscen.runs.run_settings import RunSettings
@@ -36,12 +37,13 @@ from odscen.scenario.document.scenario_document import (
     Scenario,
     Simulation,
 )
+from odscen.scenario.placing.region import place_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from odscen.app.maps import LoadedMap
-    from odscen.learning.fill import FillRequest
+    from odscen.learning.fill import Fill, FillRequest
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Actor
     from odscen.scenario.document.signals_document import Signals
@@ -103,16 +105,16 @@ def driven_fill(
     if not vehicles or kilometres <= 0.0 or not request.vehicles:
         return None
     density = COMING * request.vehicles / kilometres
-    best = PlacedTraffic(*(np.empty(0, dtype=np.int64),) * 2, np.empty(0))
+    best = NOBODY
     for _ in range(ATTEMPTS):
         scenario = warm_up_scenario(
             loaded, region, vehicles,
             density=density, seed=request.seed, seconds=seconds, signals=before,
         )  # fmt: skip
-        found = _drive(workspace, loaded, scenario, allowed)
-        if _distance(found, request.vehicles) < _distance(best, request.vehicles):
+        found = _drive_traffic(workspace, loaded, scenario, allowed)
+        if _count_distance(found, request.vehicles) < _count_distance(best, request.vehicles):
             best = found
-        if _distance(best, request.vehicles) <= CLOSE:
+        if _count_distance(best, request.vehicles) <= CLOSE:
             break
         share = (request.vehicles + 1) / (len(found.node) + 1)
         density = min(density * float(np.clip(share**2, 0.25, 4.0)), DENSEST)
@@ -121,36 +123,19 @@ def driven_fill(
     rng = stream(request.seed, "moving start")
     keep = np.sort(rng.permutation(len(best.node))[: request.vehicles])
     traffic = PlacedTraffic(best.node[keep], best.category[keep], best.speed[keep])
-    limit = np.where(lanes.speed_limit > 0.0, lanes.speed_limit, np.inf)[traffic.node]
-    limit = np.where(np.isfinite(limit), limit, traffic.speed + 1.0)
-    walkers = _walker_nodes(region, actors)
-    rest = np.full(len(walkers), np.nan)
-    return Fill(
-        node=np.concatenate([traffic.node, walkers]),
-        category=np.concatenate(
-            [names_of(traffic.category), np.full(len(walkers), str(Category.PEDESTRIAN))]
-        ),
-        initial_speed=np.concatenate([traffic.speed, rest]),
-        desired_speed=np.concatenate([draw_desired_speeds(traffic, limit, rng), rest]),
-        goal=np.concatenate(
-            [
-                onward_goals(
-                    region.graph, request.roads, node=traffic.node, speed=traffic.speed, rng=rng
-                ),
-                np.full(len(walkers), NO_GOAL),
-            ]
-        ),
+    desired = draw_desired_speeds(traffic, road_limits(region.graph)[traffic.node], rng)
+    goal = onward_goals(
+        region.graph, request.roads, node=traffic.node, speed=traffic.speed, rng=rng
     )
+    return fill_with_walkers(traffic, desired, goal, _walker_nodes(region, actors))
 
 
-def _distance(found: PlacedTraffic, wanted: int) -> float:
+def _count_distance(found: PlacedTraffic, wanted: int) -> float:
     """How far a number of vehicles is from the number wanted, as a share of it."""
     return abs(len(found.node) - wanted) / max(wanted, 1)
 
 
 def _walker_nodes(region: Region, actors: Sequence[Actor]) -> np.ndarray:
-    from odscen.scenario.placing.region import place_of
-
     places = [place_of(region.graph, one.spawn) for one in actors]
     return np.array(
         [place.node for place in places if place is not None and place.walk], dtype=np.int64
@@ -192,7 +177,7 @@ def warm_up_scenario(
     )
 
 
-def _drive(
+def _drive_traffic(
     workspace: Workspace, loaded: LoadedMap, scenario: Scenario, allowed: np.ndarray
 ) -> PlacedTraffic:
     """Vehicles at the end of a run that are on nodes where they may be placed."""
@@ -213,7 +198,7 @@ def _drive(
         rows = vehicles_of(run)
     times = rows["time"].to_numpy()
     if not len(times):
-        return PlacedTraffic(*(np.empty(0, dtype=np.int64),) * 2, np.empty(0))
+        return NOBODY
     rows = rows.filter(times > times.max() - 0.01).sort("id")
     node, good = nodes_under(loaded, rows)
     names = [str(category) for category in Category]

@@ -106,7 +106,7 @@ def join_junctions(
         )
     }
     roads = {
-        number: _relink(road, first, second) for number, road in odr.roads.items()
+        number: _relink_road(road, first, second) for number, road in odr.roads.items()
         if number not in gone
     }  # fmt: skip
     connections = [
@@ -186,7 +186,7 @@ def _find_chains(
                 yield _Chain(start, path[1:-1], end)
 
 
-def _relink(road: model.Road, first: JunctionId, second: JunctionId) -> model.Road:
+def _relink_road(road: model.Road, first: JunctionId, second: JunctionId) -> model.Road:
     """A road of the second junction, or at it, as one of the first."""
 
     def of_first(link: model.RoadLink | None) -> model.RoadLink | None:

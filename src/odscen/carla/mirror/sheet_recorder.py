@@ -92,9 +92,9 @@ class SheetRecorder:
             picture = self._waiting.popleft()
             near = min(ticks, key=lambda one: abs(one.elapsed - picture.time))
             if abs(near.elapsed - picture.time) < _SAME:
-                self._keep(near, picture)
+                self._keep_picture(near, picture)
 
-    def _keep(self, tick: _Tick, picture: Picture) -> None:
+    def _keep_picture(self, tick: _Tick, picture: Picture) -> None:
         if self._kept and tick.shown.time < self._kept[-1].tick.shown.time + self._apart - _SAME:
             return
         self._kept.append(_Kept(tick, picture.height / picture.width, still(picture, "jpeg")))
@@ -106,9 +106,9 @@ class SheetRecorder:
         """What is kept, in the order of time."""
         self._match_waiting()
         chosen = np.unique(np.linspace(0, len(self._kept) - 1, self._wanted).round().astype(int))
-        return [self._moment(self._kept[k]) for k in chosen] if self._kept else []
+        return [self._describe_moment(self._kept[k]) for k in chosen] if self._kept else []
 
-    def _moment(self, kept: _Kept) -> SheetMoment:
+    def _describe_moment(self, kept: _Kept) -> SheetMoment:
         tick, shown = kept.tick, kept.tick.shown
         actors = [self._plan.actors[row] for row in shown.index.tolist()]
         tall = self._span * kept.shape

@@ -253,16 +253,36 @@ class ReferenceGenerator:
         desired = draw_desired_speeds(traffic, site.limit[traffic.node], rng)
         goal = onward_goals(graph, request.roads, node=traffic.node, speed=traffic.speed, rng=rng)
         walkers = _draw_walkers(request, rng)
-        rest = np.full(len(walkers), np.nan)
-        return Fill(
-            node=np.concatenate([traffic.node, walkers]),
-            category=np.concatenate(
-                [names_of(traffic.category), np.full(len(walkers), str(Category.PEDESTRIAN))]
-            ),
-            initial_speed=np.concatenate([traffic.speed, rest]),
-            desired_speed=np.concatenate([desired, rest]),
-            goal=np.concatenate([goal, np.full(len(walkers), NO_GOAL)]),
-        )
+        return fill_with_walkers(traffic, desired, goal, walkers)
+
+
+def fill_with_walkers(
+    traffic: PlacedTraffic, desired: FloatArray, goal: IntArray, walkers: IntArray
+) -> Fill:
+    """Put vehicles and pedestrians into one fill.
+
+    Parameters
+    ----------
+    desired, goal
+        Shape ``(V,)``: desired speeds of the vehicles, m/s, and nodes of their goals.
+    walkers
+        Shape ``(P,)``: nodes of the pedestrian graph.
+    """
+    rest = np.full(len(walkers), np.nan)
+    return Fill(
+        node=np.concatenate([traffic.node, walkers]),
+        category=np.concatenate(
+            [names_of(traffic.category), np.full(len(walkers), str(Category.PEDESTRIAN))]
+        ),
+        initial_speed=np.concatenate([traffic.speed, rest]),
+        desired_speed=np.concatenate([desired, rest]),
+        goal=np.concatenate([goal, np.full(len(walkers), NO_GOAL)]),
+    )
+
+
+def road_limits(graph: MapGraph) -> FloatArray:
+    """Speed at which each node of the lane graph is driven at most, shape ``(N,)``, m/s."""
+    return _make_site(graph.lanes, graph.walks).limit
 
 
 def names_of(category: IntArray) -> Array:
