@@ -22,7 +22,7 @@ import polars as pl
 import pytest
 from lxml import etree, html
 
-from odscen.app.exchange.exports import export, export_run, export_runs
+from odscen.app.exchange.exports import contents_of, export, export_run, export_runs, run_contents
 from odscen.app.exchange.recorded_traffic import read_recorded_traffic
 from odscen.app.running import reports
 from odscen.app.running.batches import run_many
@@ -68,6 +68,16 @@ def exports(workspace: Workspace, run: Run, tmp_path_factory: pytest.TempPathFac
     for name in FORMATS:
         export_run(workspace, run.folder, out / name, to=name)
     return out
+
+
+def test_formats_written_together_have_the_bytes_of_each_alone(
+    workspace: Workspace, run: Run, exports: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = {name: {} for name in FORMATS}
+    monkeypatch.setattr("odscen.opendrive.parse.parse", None)  # the map has been read by then
+    for name, files_of in run_contents(workspace, run.folder, whole).items():
+        alone = {one.name: one.read_bytes() for one in (exports / name).iterdir()}
+        assert contents_of(files_of) == alone, name
 
 
 def _file(exports: Path, pattern: str) -> Path:

@@ -294,14 +294,10 @@ class _StoppableReporter(Reporter):
 def _export_run(
     formats: tuple[str, ...], workspace: Workspace, result: Run
 ) -> dict[str, dict[str, bytes]]:
-    from odscen.app.exchange.exports import export_run
+    from odscen.app.exchange.exports import contents_of, run_contents
 
-    found = {}
-    for form in formats:
-        with scratch_folder() as folder:
-            files = export_run(workspace, result.folder, folder, to=form)
-            found[form] = {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
-    return found
+    found = run_contents(workspace, result.folder, {form: {} for form in formats})
+    return {form: contents_of(files) for form, files in found.items()}
 
 
 def packed(folder: Path) -> bytes:

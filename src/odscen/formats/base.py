@@ -8,7 +8,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Protocol
+from threading import RLock
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, Protocol, TypeVar, cast
 
 from odscen.base.errors import InputError
 from odscen.base.given_files import MOST
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from odscen.simulators.assets import Assets
     from odscen.sumo.realize.sumo_map import SumoMap
 
+_Made = TypeVar("_Made")
 Subject = Literal["scenario", "run", "map"]
 VERDICTS: Final = ("taken", "approximated", "ignored", "refused")
 """What can become of an element of a file, from the best to the worst."""
@@ -160,6 +162,28 @@ class RecordedRun:
     step: float
 
 
+class Kept:
+    """What is made once and kept for the exports that follow, by name.
+
+    >>> kept = Kept()
+    >>> kept.made("lanes", lambda: [1, 2])
+    [1, 2]
+    >>> kept.made("lanes", lambda: [])
+    [1, 2]
+    """
+
+    def __init__(self) -> None:
+        self._made: dict[object, object] = {}
+        self._lock = RLock()
+
+    def made(self, name: object, make: Callable[[], _Made]) -> _Made:
+        """What was made under a name; it is made at the first time, by one thread alone."""
+        with self._lock:
+            if name not in self._made:
+                self._made[name] = make()
+            return cast("_Made", self._made[name])
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ExportSource:
     """A scenario, or a run of one, to be written.
@@ -186,6 +210,10 @@ class ExportSource:
         The road model of the map, for formats that need it.
     report
         Gives the page of the run's report with a replay, of a run.
+    of_map
+        What formats have made of the map; all exports on one map may share it.
+    of_run
+        What formats have made of the run; all exports of one run may share it.
     """
 
     name: str
@@ -198,6 +226,8 @@ class ExportSource:
     recorded: RecordedRun | None = None
     roads: OpenDrive | None = None
     report: Callable[[], str] | None = None
+    of_map: Kept = field(default_factory=Kept)
+    of_run: Kept = field(default_factory=Kept)
 
 
 ExportFiles = Mapping[str, "str | bytes | Path"]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         CrosswalkElement,
         LaneElement,
         LaneSignals,
+        MapElements,
         RunRecording,
         Tracks,
     )
@@ -71,6 +72,7 @@ def write_commonroad_files(source: ExportSource) -> ExportFiles:
     from odscen.formats.recordings.record import recording_of
 
     recording = recording_of(source)
+    bounds = source.of_map.made("commonroad", lambda: _write_bounds(recording.elements))
     elements, tracks = recording.elements, recording.tracks
     stretches = list(_presence_stretches(tracks))
     limits = sorted({lane.speed_limit for lane in elements.lanes if 0 < lane.speed_limit < 1e3})
@@ -87,7 +89,7 @@ def write_commonroad_files(source: ExportSource) -> ExportFiles:
             "<location><geoNameId>-999</geoNameId><gpsLatitude>999</gpsLatitude>"
             "<gpsLongitude>999</gpsLongitude></location>",
             "<scenarioTags><simulated/></scenarioTags>",
-            *_write_lanelets(recording, ids, limits, lights),
+            *_write_lanelets(recording, ids, limits, lights, bounds),
             *(
                 _write_crosswalk(one, ids.crosswalks + k)
                 for k, one in enumerate(elements.crosswalks)
@@ -153,8 +155,20 @@ def _describe_export(
 
 
 # ---------------------------------------------------------------------------- lanelets and lights
+def _write_bounds(elements: MapElements) -> list[str]:
+    """Borders of each lane."""
+    return [
+        _write_bound("leftBound", lane.left) + _write_bound("rightBound", lane.right)
+        for lane in elements.lanes
+    ]
+
+
 def _write_lanelets(
-    recording: RunRecording, ids: _Ids, limits: list[float], lights: list[list[int]]
+    recording: RunRecording,
+    ids: _Ids,
+    limits: list[float],
+    lights: list[list[int]],
+    bounds: list[str],
 ) -> Iterator[str]:
     at_approach: dict[int, list[int]] = {}
     for k, rows in enumerate(lights):
@@ -165,8 +179,7 @@ def _write_lanelets(
         yield "".join(
             [
                 f'<lanelet id="{ids.lanes + row}">',
-                _write_bound("leftBound", lane.left),
-                _write_bound("rightBound", lane.right),
+                bounds[row],
                 *(f'<predecessor ref="{ids.lanes + entry}"/>' for entry in lane.entries),
                 *(f'<successor ref="{ids.lanes + number}"/>' for number in lane.exits),
                 _write_adjacent("adjacentLeft", lane, lane.left_lane, ids, beyond=lane.keeps_right),

@@ -60,9 +60,14 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
     """
     import polars as pl
 
-    from odscen.formats.recordings.map_elements import map_elements
     from odscen.formats.recordings.osi_mcap import write_mcap
-    from odscen.formats.recordings.record import WINDOW, lane_signals, seconds_option
+    from odscen.formats.recordings.record import (
+        WINDOW,
+        elements_of,
+        lane_signals,
+        movements_of,
+        seconds_option,
+    )
 
     container = source.options.get("container", CONTAINERS[0])
     if container not in CONTAINERS:
@@ -85,8 +90,8 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
         )
     states = _complete_states(source, recorded, rows)
     times = states["time"].unique().sort().to_numpy()
-    lanes = map_elements(source.roads, source.sumo_map.graph.lanes).lanes
-    signals = lane_signals(source.sumo_map, lanes, recorded.states, times)
+    lanes = elements_of(source, source.roads).lanes
+    signals = lane_signals(movements_of(source, lanes), lanes, recorded.states, times)
     here = set(states["id"].unique().to_list())
     users = [user for user in recorded.users if user.id in here]
     number = {user.id: row + 1 for row, user in enumerate(users)}

@@ -42,10 +42,9 @@ def write_run_arrays(source: ExportSource) -> ExportFiles:
     recording = recording_of(source)
     arrays = {
         **_describe_recording(recording),
-        **_graph_arrays(source.sumo_map.graph),
-        **_element_arrays(recording.elements),
+        **source.of_map.made("pyg", lambda: _map_arrays(source, recording.elements)),
         **_track_arrays(recording),
-        "agent_node": _first_nodes(recording, source.sumo_map.graph),
+        "agent_node": _first_nodes(recording, source),
     }
     return {f"{recording.name}.npz": npz_bytes(arrays)}
 
@@ -65,6 +64,10 @@ def _describe_recording(recording: RunRecording) -> Arrays:
         "interpolated": recording.interpolated,
     }
     return {"about": np.array(json.dumps(about, ensure_ascii=False)), "time": recording.times}
+
+
+def _map_arrays(source: ExportSource, elements: MapElements) -> Arrays:
+    return {**_graph_arrays(source.sumo_map.graph), **_element_arrays(elements)}
 
 
 def _graph_arrays(graph: MapGraph) -> Arrays:
@@ -145,7 +148,9 @@ def _track_arrays(recording: RunRecording) -> Arrays:
     }
 
 
-def _first_nodes(recording: RunRecording, graph: MapGraph) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _first_nodes(
+    recording: RunRecording, source: ExportSource
+) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Node of the lane graph that each vehicle is nearest to at first; -1 for pedestrians."""
     import numpy as np
     from scipy.spatial import cKDTree
@@ -154,8 +159,9 @@ def _first_nodes(recording: RunRecording, graph: MapGraph) -> np.ndarray[Any, np
     first = np.argmax(tracks.valid, axis=1)
     rows = np.arange(len(first))
     places = np.stack([tracks.x[rows, first], tracks.y[rows, first]], axis=1)
-    nodes = np.stack([graph.lanes.x, graph.lanes.y], axis=1)
-    nearest = cKDTree(nodes).query(places)[1].astype(np.int64)
+    lanes = source.sumo_map.graph.lanes
+    tree = source.of_map.made("node tree", lambda: cKDTree(np.stack([lanes.x, lanes.y], axis=1)))
+    nearest = tree.query(places)[1].astype(np.int64)
     walks = np.array([category == "pedestrian" for category in tracks.categories], dtype=np.bool_)
     return np.where(walks, np.int64(-1), nearest)
 

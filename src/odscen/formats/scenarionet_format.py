@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from odscen.formats.base import WINDOW_OPTIONS, Format
 
 if TYPE_CHECKING:
+    from odscen.base.arrays import FloatArray
     from odscen.formats.base import ExportFiles, ExportSource
     from odscen.formats.recordings.run_recording import (
         LaneElement,
@@ -50,7 +51,9 @@ def write_scenario_descriptions(source: ExportSource) -> ExportFiles:
     """
     from odscen.formats.recordings.record import recording_of
 
-    description = _describe_scenario(recording_of(source))
+    recording = recording_of(source)
+    features = source.of_map.made("scenarionet", lambda: _describe_features(recording.elements))
+    description = _describe_scenario(recording, features)
     name = f"sd_{DATASET}_{description['version'].replace(' ', '_')}_{description['id']}.pkl"
     return {
         name: pickled(description),
@@ -75,12 +78,15 @@ def pickled(value: object) -> bytes:
     return buffer.getvalue()
 
 
-def _describe_scenario(recording: RunRecording) -> dict[str, Any]:
+def _describe_scenario(recording: RunRecording, features: dict[str, Any]) -> dict[str, Any]:
     import numpy as np
 
     tracks, length = recording.tracks, len(recording.times)
+    velocity = tracks.velocity
     leading = tracks.ids[max(tracks.leading(0), 0)]
-    objects = {name: _describe_track(tracks, row) for row, name in enumerate(tracks.ids)}
+    objects = {
+        name: _describe_track(tracks, row, velocity[row]) for row, name in enumerate(tracks.ids)
+    }
     return {
         "id": recording.name,
         "version": VERSION,
@@ -110,11 +116,11 @@ def _describe_scenario(recording: RunRecording) -> dict[str, Any]:
         },
         "tracks": objects,
         "dynamic_map_states": _describe_lights(recording),
-        "map_features": _describe_features(recording.elements),
+        "map_features": features,
     }
 
 
-def _describe_track(tracks: Tracks, row: int) -> dict[str, Any]:
+def _describe_track(tracks: Tracks, row: int, velocity: FloatArray) -> dict[str, Any]:
     import numpy as np
 
     valid = tracks.valid[row]
@@ -130,7 +136,7 @@ def _describe_track(tracks: Tracks, row: int) -> dict[str, Any]:
         "state": {
             "position": np.stack([tracks.x[row], tracks.y[row], z], axis=-1),
             "heading": tracks.hdg[row],
-            "velocity": tracks.velocity[row],
+            "velocity": velocity,
             "length": sized(float(tracks.length[row])),
             "width": sized(float(tracks.width[row])),
             "height": sized(height),

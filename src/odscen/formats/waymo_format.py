@@ -51,7 +51,7 @@ def write_waymo_scenarios(source: ExportSource) -> ExportFiles:
 
     recording = recording_of(source)
     number = {name: row + 1 for row, name in enumerate(recording.tracks.ids)}
-    features = _map_features(recording.elements)
+    features = source.of_map.made("waymo", lambda: _map_features(recording.elements))
     records, listed = [], []
     for first in _window_starts(len(recording.times)):
         tracks = recording.tracks.part(first, first + STEPS)
@@ -97,12 +97,13 @@ def _encode_scenario(
     from odscen.formats.recordings.protobuf_wire import double, message, text, whole
 
     times = [round(k * 0.1, 6) for k in range(STEPS)]
+    velocity = tracks.velocity
     leading = max(tracks.leading(min(PRESENT, tracks.valid.shape[1] - 1)), 0)
     return b"".join(
         [
             *(double(1, time) for time in times),
             *(
-                message(2, _encode_track(tracks, row, number[one]))
+                message(2, _encode_track(tracks, row, velocity[row], number[one]))
                 for row, one in enumerate(tracks.ids)
             ),
             text(5, name),
@@ -115,7 +116,7 @@ def _encode_scenario(
     )
 
 
-def _encode_track(tracks: Tracks, row: int, number: int) -> bytes:
+def _encode_track(tracks: Tracks, row: int, velocity: FloatArray, number: int) -> bytes:
     import numpy as np
 
     from odscen.formats.recordings.protobuf_wire import packed_messages, whole
@@ -126,7 +127,6 @@ def _encode_track(tracks: Tracks, row: int, number: int) -> bytes:
         return np.pad(values, (0, missing))
 
     valid = np.pad(tracks.valid[row], (0, missing))
-    velocity = tracks.velocity[row]
     height = float(tracks.height[row])
     columns = {
         2: ("d", padded(tracks.x[row])),
@@ -158,17 +158,20 @@ def _light_states(recording: RunRecording, first: int) -> Iterator[bytes]:
     from odscen.formats.recordings.protobuf_wire import message, whole
 
     signals = recording.signals
-    lanes = (signals.lane + 1).tolist()
-    stops = [message(3, _encode_point(stop)) for stop in signals.stop]
+    shown = [
+        [
+            message(1, whole(1, lane) + whole(2, state) + message(3, _encode_point(stop)))
+            for state in _STATES
+        ]
+        for lane, stop in zip((signals.lane + 1).tolist(), signals.stop, strict=True)
+    ]
     for instant in range(first, first + STEPS):
         if instant >= len(recording.times):
             yield b""
             continue
         yield b"".join(
-            message(1, whole(1, lane) + whole(2, _STATES[color]) + stop)
-            for lane, color, stop in zip(
-                lanes, signals.color[:, instant].tolist(), stops, strict=True
-            )
+            by_color[color]
+            for by_color, color in zip(shown, signals.color[:, instant].tolist(), strict=True)
         )
 
 

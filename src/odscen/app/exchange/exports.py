@@ -8,6 +8,7 @@ import shutil
 import zipfile
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -20,11 +21,13 @@ from odscen.formats import find_format, list_formats
 from odscen.formats.base import NOTES_SUFFIX
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from odscen.base.given_files import GivenPath
-    from odscen.formats.base import ExportFiles, ExportSource, Format, RecordedRun
+    from odscen.formats.base import ExportFiles, ExportSource, Format, Kept, RecordedRun
+    from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
+    from odscen.opendrive.road_model import OpenDrive
     from odscen.runs.finished_run import Run
     from odscen.scenario.document.scenario_document import Scenario
 
@@ -133,11 +136,41 @@ def export_run(
     WorkspaceError
         If the folder cannot be written.
     """
-    from odscen.app.running.reports import replay_page
-    from odscen.app.scenarios import read_scenario
-    from odscen.runs.finished_run import Run
-    from odscen.runs.layout import SCENARIO_FILE
+    return _write_files(run_contents(workspace, run, {to: options or {}})[to], as_path(out))
 
+
+def run_contents(
+    workspace: Workspace, run: GivenPath, wanted: Mapping[str, Mapping[str, str]]
+) -> dict[str, ExportFiles]:
+    """Make the files of a run in several formats; it is read once for all of them.
+
+    Parameters
+    ----------
+    run
+        As of :func:`export_run`, with the same errors.
+    wanted
+        Options by format.
+
+    Returns
+    -------
+    dict
+        By format and name, see :data:`~odscen.formats.base.ExportFiles`.
+    """
+    writers = {to: _run_writer(to, options) for to, options in wanted.items()}
+    source = _run_source(workspace, run)
+    found = {}
+    for to, (chosen, write) in writers.items():
+        own = replace(source, options=dict(wanted[to]))
+        if chosen.needs_roads:
+            own = replace(own, roads=source.of_map.made("roads", lambda: _read_roads(source)))
+        found[to] = write(own)
+    return found
+
+
+def _run_writer(
+    to: str, options: Mapping[str, str]
+) -> tuple[Format, Callable[[ExportSource], ExportFiles]]:
+    """A format that runs are written in, and what writes it."""
     chosen = _choose_format(to, options)
     if "run" not in chosen.of or chosen.write is None:
         able = ", ".join(
@@ -146,19 +179,37 @@ def export_run(
             if "run" in one.of and one.write is not None
         )
         raise InputError(f"the format {to} cannot say what happened in a run; {able} can")
+    return chosen, chosen.write
+
+
+def _run_source(workspace: Workspace, run: GivenPath) -> ExportSource:
+    from odscen.app.running.reports import replay_page
+    from odscen.app.scenarios import read_scenario
+    from odscen.runs.finished_run import Run
+    from odscen.runs.layout import SCENARIO_FILE
+
     opened = Run.open(run)
     folder = opened.folder
     recorded = _read_recorded(opened)
     seed = opened.known["seed"]  # perhaps another one than the scenario's own
     document = read_scenario(folder / SCENARIO_FILE).model_copy(update={"seed": seed})
-    source = _make_source(workspace, document, folder.resolve().name, options, recorded)
-    source = replace(source, report=lambda: replay_page(workspace, folder, recorded))
-    if chosen.needs_roads:
-        from odscen.opendrive.parse import parse
+    source = _make_source(workspace, document, folder.resolve().name, None, recorded)
+    return replace(source, report=lambda: replay_page(workspace, folder, recorded))
 
-        file = source.map_file
-        source = replace(source, roads=parse(file.read_bytes(), file=file.name))
-    return _write_files(chosen.write(source), as_path(out))
+
+def _read_roads(source: ExportSource) -> OpenDrive:
+    from odscen.opendrive.parse import parse
+
+    return parse(source.map_file.read_bytes(), file=source.map_file.name)
+
+
+@lru_cache(maxsize=2)
+def _kept_of(entry: MapEntry) -> Kept:
+    """What formats have made of a map; that of the last two stays in memory."""
+    from odscen.formats.base import Kept
+
+    del entry
+    return Kept()
 
 
 def export_runs(
@@ -265,6 +316,18 @@ def _read_recorded(run: Run) -> RecordedRun:
     return RecordedRun(plan.actors, rows, read_light_states(run.folder), until, step)
 
 
+def contents_of(files: ExportFiles) -> dict[str, bytes]:
+    """Bytes of the files of an export."""
+    return {
+        name: content.read_bytes()
+        if isinstance(content, Path)
+        else content.encode()
+        if isinstance(content, str)
+        else content
+        for name, content in files.items()
+    }
+
+
 def _make_source(
     workspace: Workspace,
     document: Scenario,
@@ -285,6 +348,7 @@ def _make_source(
         assets=workspace.assets(),
         options=dict(options or {}),
         recorded=recorded,
+        of_map=_kept_of(loaded.entry),
     )
 
 

@@ -9,7 +9,7 @@ lane that leads to the light, and the first lane through the junction on the sho
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from odscen.base.arrays import FloatArray
-    from odscen.formats.base import ExportSource
-    from odscen.formats.recordings.run_recording import LaneElement
+    from odscen.formats.base import ExportSource, RecordedRun
+    from odscen.formats.recordings.run_recording import LaneElement, MapElements
+    from odscen.opendrive.road_model import OpenDrive
     from odscen.sumo.realize.sumo_map import SumoMap
 
 
@@ -43,13 +44,28 @@ _COLORS = {
 _SAME = 1e-6
 
 
+class Movement(NamedTuple):
+    """From lane to lane over the stop line of a light; ``turn`` is SUMO's letter."""
+
+    light: str
+    link: int
+    turn: str
+    approach: int
+    lane: int
+
+
 def lane_signals(
-    sumo_map: SumoMap, lanes: Sequence[LaneElement], states: pl.DataFrame | None, times: FloatArray
+    movements: Sequence[Movement],
+    lanes: Sequence[LaneElement],
+    states: pl.DataFrame | None,
+    times: FloatArray,
 ) -> LaneSignals:
     """States of all lanes with a light.
 
     Parameters
     ----------
+    movements
+        Of the map, see :func:`movements_of`.
     states
         As of :func:`~odscen.runs.recorded.read_light_states`.
     times
@@ -57,16 +73,11 @@ def lane_signals(
     """
     shown = {} if states is None else dict(_letters_by_light(states, times))
     found: dict[tuple[int, int], tuple[str, NDArray[np.uint8]]] = {}
-    for light, link, approach, lane in _light_movements(sumo_map, lanes):
+    for light, link, turn, approach, lane in movements:
         letters = shown.get(light)
         if letters is None:
             continue
         color = _colors_of_link(letters, link)
-        turn = (
-            next(sumo_light for sumo_light in sumo_map.lights if sumo_light.id == light)
-            .links[link]
-            .turn
-        )
         known = found.get((approach, lane))
         # Two links over one lane: who may go on either of them has green.
         found[approach, lane] = (turn, color if known is None else np.maximum(known[1], color))
@@ -96,10 +107,9 @@ def _colors_of_link(letters: Sequence[str], link: int) -> NDArray[np.uint8]:
     )
 
 
-def _light_movements(
-    sumo_map: SumoMap, lanes: Sequence[LaneElement]
-) -> Iterator[tuple[str, int, int, int]]:
-    """Light, link, lane before and lane behind the stop line, of each movement that is found."""
+def _light_movements(sumo_map: SumoMap, lanes: Sequence[LaneElement]) -> list[Movement]:
+    """Movements over stop lines that are found on the lane graph."""
+    found = []
     row_of = {lane.key: row for row, lane in enumerate(lanes)}
     for light in sumo_map.lights:
         for link, one in enumerate(light.links):
@@ -110,7 +120,8 @@ def _light_movements(
             path = _shortest_lane_path(lanes, source, target)
             inside = next((k for k, row in enumerate(path) if lanes[row].junction), None)
             if inside:
-                yield light.id, link, path[inside - 1], path[inside]
+                found.append(Movement(light.id, link, one.turn, path[inside - 1], path[inside]))
+    return found
 
 
 def _shortest_lane_path(lanes: Sequence[LaneElement], source: int, target: int) -> list[int]:
@@ -137,13 +148,30 @@ def recording_of(source: ExportSource) -> RunRecording:
     InputError
         If it is no run, an option is no number, or the window has no road users, or too many.
     """
-    recorded = source.recorded
-    if recorded is None or source.roads is None:
+    recorded, roads = source.recorded, source.roads
+    if recorded is None or roads is None:
         raise InputError("this format says what happened in a run: name the folder of one")
-    times = instants(
-        recorded, ExportWindow(*(seconds_option(source.options, name) for name in WINDOW))
-    )
-    elements = map_elements(source.roads, source.sumo_map.graph.lanes)
+    window = ExportWindow(*(seconds_option(source.options, name) for name in WINDOW))
+    return source.of_run.made(window, lambda: _make_recording(source, recorded, roads, window))
+
+
+def elements_of(source: ExportSource, roads: OpenDrive) -> MapElements:
+    """Elements of the map, made once for all exports on it."""
+    graph = source.sumo_map.graph.lanes
+    return source.of_map.made("elements", lambda: map_elements(roads, graph))
+
+
+def movements_of(source: ExportSource, lanes: Sequence[LaneElement]) -> list[Movement]:
+    """Movements over stop lines of the map, made once for all exports on it."""
+    return source.of_map.made("movements", lambda: _light_movements(source.sumo_map, lanes))
+
+
+def _make_recording(
+    source: ExportSource, recorded: RecordedRun, roads: OpenDrive, window: ExportWindow
+) -> RunRecording:
+    times = instants(recorded, window)
+    elements = elements_of(source, roads)
+    movements = movements_of(source, elements.lanes)
     return RunRecording(
         name=source.name,
         scenario=source.scenario.name,
@@ -154,7 +182,7 @@ def recording_of(source: ExportSource) -> RunRecording:
         recorded_step=round(recorded.step, 6),
         elements=elements,
         tracks=tracks_of(source, recorded, times),
-        signals=lane_signals(source.sumo_map, elements.lanes, recorded.states, times),
+        signals=lane_signals(movements, elements.lanes, recorded.states, times),
     )
 
 
