@@ -351,7 +351,7 @@ def test_a_copy_is_a_scenario_of_its_own(client: TestClient, new: str) -> None:
     copy = client.post(f"/api/scenarios/{new}/copy", json={})
     assert copy.status_code == 201
     assert copy.json()["name"] != new
-    assert copy.json()["document"] == grown["document"]
+    assert copy.json()["document"] == grown["document"] | {"name": copy.json()["name"]}
     assert copy.json()["undo"] is None
     post_edit(client, copy.json()["name"], 1, "grow_roi", segment="j10001")
     assert client.get(f"/api/scenarios/{new}").json()["document"]["roi"] == ["r1"]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from odscen.app.running.confident_runs import Confidence
     from odscen.experiments.studies import StudyState
 
-SHOWN_FIGURES: Final = ("mean_speed", "mean_delay", "arrived", "collided")
+SHOWN_FIGURES: Final = ("mean_delay", "mean_speed", "arrived", "collided")
 MOST_ROWS: Final = 500
 """Of a table on the page; the Parquet file has all."""
 _SHARE: Final = 0.05

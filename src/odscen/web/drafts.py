@@ -23,6 +23,7 @@ from odscen.base.text_files import clear_parts, write_text
 from odscen.maps.folder_names import check_name, is_name
 from odscen.maps.wastebasket import HISTORY, Wastebasket
 from odscen.scenario.document.json_form import dumps, loads
+from odscen.scenario.edits import rename
 from odscen.scenario.edits.edit_history import History, document_sha256
 from odscen.web.messages import ScenarioRow
 
@@ -118,19 +119,28 @@ class Drafts:
             scenario = loads(text, file=f"{name}{SUFFIX}")
             return self._keep_open(Draft(name, scenario, self._history_of(name).open(text)))
 
-    def create(self, scenario: Scenario, name: str | None, *, stem: str, label: str) -> Draft:
+    def create(
+        self, scenario: Scenario, name: str | None, *, stem: str, label: str, renamed: bool = False
+    ) -> Draft:
         """Save a new scenario; a free name is made from ``stem`` if none is given.
+
+        Parameters
+        ----------
+        renamed
+            Call the document by the name, too.
 
         Raises
         ------
         ConflictError
             If the name is taken.
         """
-        text = dumps(scenario)
         alone = locked(self._folder / HISTORY, what="the list of scenarios", patience=_PATIENCE)
         with self._lock, disk_errors("scenarios"), alone:
             name = self._free_name(stem) if name is None else check_name(name, what="scenario")
             self._refuse_taken(name)
+            if renamed:
+                scenario = rename(scenario, name=name)
+            text = dumps(scenario)
             begun = self._history_of(name).begin(text, label=label)
             write_text(self._path_of(name), text)
             return self._keep_open(Draft(name, scenario, begun))

@@ -107,6 +107,28 @@ def test_with_ahead_there_is_no_headway_to_one_behind_and_without_free_it_is_of_
     assert found == 0.0
 
 
+@pytest.mark.parametrize(
+    ("away", "speed", "brakes", "step"),
+    [(8.0, 10.1, -8.0, 0.1), (20.0, 11.0, -4.5, 0.5), (12.0, 9.5, -2.0, 0.5)],
+)
+def test_seconds_of_a_rule_that_starts_within_a_step_are_those_of_its_bound(
+    away: float, speed: float, brakes: float, step: float
+) -> None:
+    """The car brakes before one that follows: 40 s, then 6 s; a line through both leads below 0."""
+    car, follows = replace(CAR, x=away, acceleration=brakes), replace(EGO, x=0.0, speed=speed)
+    when = {"ttc": {"of": "ego", "to": "car", "below": 3.0}}
+    found = next(one for one in story([rule(when)], car, follows, step=step) if one.values)
+    assert found.values == {"ttc": pytest.approx(3.0)}
+
+
+def test_with_ahead_who_has_been_passed_has_no_time_to_collision() -> None:
+    """The ego, 20 m ahead, brakes to a halt; who comes from behind would meet it in 2 s."""
+    halts = replace(EGO, x=30.0, speed=4.0, acceleration=-2.0)
+    behind = {"of": "ego", "to": "car", "below": 3.0}
+    assert len(started(story([rule({"ttc": behind})], CAR, halts))) == 1
+    assert started(story([rule({"ttc": {**behind, "ahead": True}})], CAR, halts)) == []
+
+
 def test_bodies_that_touch_and_stay_so_have_no_time_to_collision() -> None:
     beside = replace(CAR, id="ego", x=-4.0)
     assert started(story([rule({"ttc": {"to": "ego", "below": 3.0}})], CAR, beside)) == []

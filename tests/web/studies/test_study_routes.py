@@ -88,6 +88,7 @@ def test_two_scenarios_are_compared_run_by_run_of_the_same_seed(
     study = asked(client, "", {"scenarios": [sampled, "slower"], "seeds": 3, "until": 20})["study"]
     ended(client, study)
     path = f"/api/studies/{study}/results"
+    assert client.get(path).json()["figure"] == "mean_delay"
     (found,) = client.get(path, params={"figure": "mean_speed"}).json()["between"]
     table = pl.read_parquet(workspace.studies / study / "results.parquet")
     of = {

@@ -117,11 +117,15 @@ class Reading(NamedTuple):
         By how much the condition is met, in any unit; negative where it is not.
     rate
         Change of the margin per second; ``None`` if only two readings can tell.
+    ratio
+        Metres and m/s, of a value that is the one over the other: they change evenly from step to
+        step, and their ratio does not.
     """
 
     value: float
     margin: float
     rate: float | None = None
+    ratio: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,8 +253,13 @@ def _read_seconds(part: PairBounded, gap: float, speed: float) -> Reading:
     bound = part.below if part.below is not None else (part.above or 0.0)
     moves = speed > _STILL
     margin = speed * bound - (gap if moves else max(gap, _TOUCHING))
-    value = gap / speed if moves else math.inf
-    return Reading(value, margin if part.below is not None else -margin)
+    margin = margin if part.below is not None else -margin
+    return Reading(seconds_of(gap, speed), margin, ratio=(gap, speed))
+
+
+def seconds_of(metres: float, speed: float) -> float:
+    """Seconds that metres take at a speed; without end for who does not come nearer."""
+    return max(metres, 0.0) / speed if speed > _STILL else math.inf
 
 
 def _read_distance(part: DistanceBounded, actor: str, view: RoadView) -> Reading | None:

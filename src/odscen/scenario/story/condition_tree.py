@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from odscen.scenario.story.condition_kinds import seconds_of
 from odscen.scenario.story.own_kinds import condition_kind
 
 if TYPE_CHECKING:
@@ -116,6 +117,23 @@ class LeafMemory(NamedTuple):
     margin: float | None
     holds: bool
     value: float | None = None
+    ratio: tuple[float, float] | None = None
+
+    def value_after(self, before: LeafMemory | None, share: float) -> float | None:
+        """Value at a share of the step that follows, on a line through this reading and the last.
+
+        ``None`` where it has none.
+        """
+        if before is None or not share:
+            return self.value
+        if self.ratio is not None and before.ratio is not None:
+            pairs = zip(before.ratio, self.ratio, strict=True)
+            metres, speed = (now + (now - then) * share for then, now in pairs)
+            value = seconds_of(metres, speed)
+            return value if value < math.inf else None
+        if self.value is None or before.value is None:
+            return self.value
+        return self.value + (self.value - before.value) * share
 
 
 class ConditionTree:
@@ -146,12 +164,11 @@ class ConditionTree:
         """What leaves are about so many seconds after the last look, by their place in the tree."""
         found = {}
         for leaf in self._leaves:
-            value = None if leaf.flips is None else leaf.now.value
+            if leaf.flips is None:
+                continue
+            value = leaf.now.value_after(leaf.before, seconds / self._step)
             if value is not None:
-                last = None if leaf.before is None else leaf.before.value
-                rate = 0.0 if last is None else (value - last) / self._step
-                name = leaf.key.removeprefix(self._start).lstrip(".")
-                found[name] = value + (rate * seconds if seconds else 0.0)
+                found[leaf.key.removeprefix(self._start).lstrip(".")] = value
         return found
 
     def forget(self) -> None:
@@ -247,11 +264,13 @@ class _Leaf:
             was = before is not None and before.holds
             self.now = LeafMemory(None, holds=False)
             return Flips(was, (view.time,) if was else ())
-        value, margin, rate = reading
+        value, margin, rate, ratio = reading
         flips = self._find_flips(margin, rate, before, view)
         near = -math.inf < margin < math.inf
         far = not -math.inf < value < math.inf
-        self.now = LeafMemory(margin if near else None, flips.last, None if far else value)
+        self.now = LeafMemory(
+            margin if near else None, flips.last, None if far else value, ratio if near else None
+        )
         return flips
 
     def _find_flips(

@@ -236,7 +236,8 @@ def redo(
 def copy(name: str, wish: CopyName, shared: Shared) -> ScenarioState:
     """Save a scenario under another name too; a free one is made if none is given."""
     scenario = shared.drafts.get(name).scenario
-    draft = shared.drafts.create(scenario, wish.name, stem=name, label=f"Copy of {name}")
+    label = f"Copy of {name}"
+    draft = shared.drafts.create(scenario, wish.name, stem=name, label=label, renamed=True)
     return state_of(shared, draft)
 
 
