@@ -1,4 +1,7 @@
-"""Finds texts of which a part can neither be seen nor scrolled to; fields scroll by themselves."""
+"""Finds texts of which a part can neither be seen nor scrolled to; fields scroll by themselves.
+
+And those that run out of their own element into another text.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ _CLIPPED = """() => {
     if (y && !long && (top < -SLACK || bottom > innerHeight + SLACK)) return page;
     return null;
   };
-  const found = [];
+  const found = [], running = [], texts = [];
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
     const node = walker.currentNode;
@@ -44,6 +47,12 @@ _CLIPPED = """() => {
     range.selectNodeContents(node);
     for (const box of range.getClientRects()) {
       if (box.width === 0) continue;
+      texts.push({ node, box });
+      let block = parent;
+      while (getComputedStyle(block).display === "inline") block = block.parentElement;
+      const own = block.getBoundingClientRect();
+      if (own.width <= 2) continue;  // for screen readers alone
+      if (box.right > own.right + SLACK || box.left < own.left - SLACK) running.push({ node, box });
       const by = clippedBy(box, parent);
       if (by) {
         const name = `${by.tagName.toLowerCase()}.${String(by.className).split(" ").at(-1)}`;
@@ -52,6 +61,13 @@ _CLIPPED = """() => {
       }
     }
   }
+  const words = node => `"${node.data.trim().slice(0, 60)}"`;
+  const across = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > SLACK;
+  const along = (a, b) => Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > SLACK;
+  for (const one of running)
+    for (const other of texts)
+      if (one.node !== other.node && across(one.box, other.box) && along(one.box, other.box))
+        found.push(`${words(one.node)} written over ${words(other.node)}`);
   return [...new Set(found)];
 }"""
 

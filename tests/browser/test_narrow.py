@@ -15,11 +15,14 @@ from tests.browser.conftest import ARTEFACTS
 from tests.browser.pages import OdscenPage, settle
 from tests.browser.test_accessibility import AXE
 from tests.browser.test_german_sentences import GERMAN
+from tests.browser.test_mending import spot
 from tools.page import Served
 
 SIZES = {"1440": (1440, 900), "1024": (1024, 768), "390": (390, 844), "zoomed": (720, 450)}
 """Pixels of the windows; the last is the first at 200 %."""
 STEPS = 13
+ROAD_USERS = 3
+"""Number of that step."""
 TABS = 5
 AXE_RULES = """async () => (await axe.run({resultTypes: ['violations']})).violations
     .flatMap(rule => rule.nodes.map(node => `${rule.id}: ${node.html.slice(0, 120)}`))"""
@@ -88,6 +91,10 @@ def test_each_step_of_the_editor_in_windows_of_all_sizes(viewer: OdscenPage, sam
         heads.nth(number).click()
         expect(heads.nth(number)).to_have_attribute("aria-expanded", "true")
         found += wrong(viewer, f"step {number + 1}")
+    heads.nth(ROAD_USERS).click()
+    page.locator("[data-row] .row-button").first.click()
+    expect(page.get_by_label(re.compile("^Ego: "))).to_be_visible()
+    found += wrong(viewer, "a road user")
     assert_map_in_sight(viewer)
     page.keyboard.press("Control+k")
     expect(page.get_by_role("dialog")).to_be_visible()
@@ -146,4 +153,17 @@ def test_three_dimensions_in_windows_of_all_sizes(viewer: OdscenPage, sampled: s
             expect(page.locator(".scenery canvas")).to_be_visible()
             page.wait_for_timeout(800)
             found += wrong(viewer, f"3D {view.split('/')[0]} {camera}")
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.slow
+def test_the_page_that_mends_a_map_in_windows_of_all_sizes(viewer: OdscenPage) -> None:
+    viewer.page.goto("/#/mend/signal_crossing")
+    expect(viewer.map.area).to_be_visible()
+    found = wrong(viewer, "mending")
+    viewer.map.click(spot("1", -2, 70.0))
+    side = viewer.page.locator(".import-side")
+    expect(side.locator("input").first).to_be_visible()
+    found += wrong(viewer, "mending a lane")
+    assert_map_in_sight(viewer)
     assert not found, "\n".join(found)

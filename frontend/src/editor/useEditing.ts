@@ -14,7 +14,9 @@ import { changesOf } from "./changes";
 import { handlerFor } from "./handlers";
 import type { Editing, Handler, Hover, Tool } from "./handlers/handler";
 import { usePick } from "./pick";
+import { placeWord } from "./placeWords";
 import type { Draft } from "./rules/draft";
+import { namePlaces } from "./rules/fields";
 import { everyone } from "./placing";
 import { bodyOf, firstStep, ofProblem, type Step, STEPS, wrongOnes } from "./scene";
 import { type Sights, sightsOf } from "./sights";
@@ -83,6 +85,7 @@ export function useEditing(
   const { document, problems } = scenario;
   // What is shown below says moments as times of day if there is a clock.
   countFrom(document.demand.clock, document.simulation.duration);
+  namePlaces((node) => placeWord(graph, node));
   const [step, setStep] = useState<Step>(() => keptStep() ?? firstStep(document));
   // A link selects who was selected when it was copied.
   useEffect(() => {

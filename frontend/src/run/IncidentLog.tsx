@@ -32,7 +32,11 @@ export function IncidentLog({
       </Text>
     );
   }
-  const listed = incidents.slice(-LISTED).reverse();
+  // What lasted is known at its end, after what came in between.
+  const listed = [...incidents]
+    .sort((one, other) => one.time - other.time)
+    .slice(-LISTED)
+    .reverse();
   return (
     <>
       <Text size="sm" c="dimmed">

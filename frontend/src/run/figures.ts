@@ -41,8 +41,9 @@ function plain(n: number, { unit, factor, digits }: FigureInfo["display"]): stri
   return text + suffix;
 }
 
+/** Less than a minute is said in seconds, as in the report. */
 const say = (n: number, { display }: FigureInfo): string =>
-  display.clock ? lengthOfTime(n) : plain(n, display);
+  display.clock && n >= 60 ? lengthOfTime(n) : plain(n, display);
 const words = ({ name, label, definition }: FigureInfo) => ({
   name,
   label: sentence(served(label)),

@@ -2,6 +2,7 @@ import { plural, t } from "@lingui/core/macro";
 
 import { fixed } from "../language/numbers";
 import { localized } from "../language/localized";
+import { lengthText, speedText } from "../language/units";
 import type { Incident } from "../api/runs";
 import type { Category } from "../api/types";
 import type { Mark, MarkKind } from "../map/scene";
@@ -95,11 +96,28 @@ const queued = ({ queue }: Incident): string =>
 const lasted = ({ waited }: Incident): string =>
   waited ? t` after ${waited < 60 ? t`${Math.round(waited)} s` : hoursMinutes(waited)}` : "";
 
+/** What a rule was about when it began, by the kind of condition; what is true or not says nothing more. */
+const VALUE = localized((): Record<string, (value: number) => string> => ({
+  ttc: (value) => t`time to collision ${fixed(value, 1)} s`,
+  headway: (value) => t`time headway ${fixed(value, 1)} s`,
+  stopped: (value) => t`stopped for ${fixed(value, 1)} s`,
+  distance: (value) => t`distance ${lengthText(value, 1)}`,
+  reaches: (value) => t`distance ${lengthText(value, 1)}`,
+  travelled: (value) => t`travelled ${lengthText(value)}`,
+  speed: (value) => t`speed ${speedText(value)}`,
+  relative_speed: (value) => t`relative speed ${speedText(value)}`,
+}));
+/** Kinds of conditions of which the number is known without them. */
+const PLAIN = new Set(["time", "signal", "appeared", "touched", "off_road"]);
+
 function values(incident: Incident): string {
-  const known = Object.entries(incident.values ?? {});
-  return known.length === 0
-    ? ""
-    : ` (${known.map(([name, value]) => `${name} ${fixed(value, 2)}`).join(", ")})`;
+  const words = Object.entries(incident.values ?? {}).flatMap(([name, value]) => {
+    // `all[1].ttc`: its place in the condition, and its kind.
+    const kind = name.split(".").at(-1) ?? name;
+    if (PLAIN.has(kind)) return [];
+    return [VALUE()[kind]?.(value) ?? `${kind} ${fixed(value, 2)}`];
+  });
+  return words.length === 0 ? "" : ` (${words.join(", ")})`;
 }
 
 function named(id: string, categories: ReadonlyMap<string, Category>): string {

@@ -15,6 +15,8 @@ import {
   sentence,
   settled,
 } from "../../src/editor/rules/draft";
+import { placeWord } from "../../src/editor/placeWords";
+import { namePlaces } from "../../src/editor/rules/fields";
 import { ruleShapes } from "../../src/editor/rules/ruleShapes";
 import { Graph } from "../../src/map/graph";
 import { columns } from "../example";
@@ -55,7 +57,7 @@ test("a rule is a sentence with units", () => {
       }),
     ),
   ).toBe(
-    "When speed of van-1 is above 36 km/h or distance of ego to 1, 2.5 along the lane is below 20 m, " +
+    "When speed of van-1 is above 36 km/h or distance of ego to x 1 m, y 2.5 m along the lane is below 20 m, " +
       "1.5 s later, brake at 6 m/s² to a standstill and drive on after 2 s, " +
       "then reach 72 km/h at 2 m/s², up to 2 times.",
   );
@@ -221,4 +223,15 @@ test("a pedestrian waits until 30 m, by a rule of its own; who has no rule yet c
   expect(rulesOf(walker, [], [])).toEqual([walk]); // a rule moves the pedestrian already
   const van = newDraft(["car-1", "van-1"], []);
   expect(rulesOf(van, ["pedestrian-1"], [])).toEqual([ruleOf(van)]);
+});
+
+test("a node is said as a place once the map is there", () => {
+  const graph = new Graph(columns);
+  const node = "1.0.-1.0";
+  const walks = draft({ then: [[{ kind: "walk", values: { to: node } }]] });
+  expect(sentence(walks)).toContain(`walk to ${node}.`);
+  namePlaces((id) => placeWord(graph, id));
+  expect(sentence(walks)).toContain(`walk to ${placeWord(graph, node)}.`);
+  expect(sentence(walks)).toContain("time to collision with ego is below 3 s");
+  namePlaces((id) => id);
 });

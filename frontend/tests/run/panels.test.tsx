@@ -238,7 +238,7 @@ test("incidents are reported newest first in the terms of the field, and lead to
   const onShow = vi.fn();
   const { user, again } = show(
     <IncidentLog
-      incidents={[crash, teleported]}
+      incidents={[teleported, crash]}
       categories={new Map([["c", "truck"]])}
       over
       onShow={onShow}

@@ -147,12 +147,19 @@ export const bound = (suffix: string, start: number, scale = 1, min = 0): Field 
 
 export const given = (value: unknown): boolean => value !== undefined && value !== null;
 
-export const text = (value: unknown): string =>
-  Array.isArray(value)
-    ? value.map((one) => (typeof one === "number" ? String(Number(one.toFixed(2))) : "?")).join(", ")
-    : typeof value === "string" && value
-      ? value
-      : "…";
+let placeName = (node: string): string => node;
+/** Say in sentences where nodes are; before a map is there they are called by their ids. */
+export const namePlaces = (by: (node: string) => string): void => {
+  placeName = by;
+};
+
+const metres = (value: unknown): string => (typeof value === "number" ? short(value, 1) : "?");
+
+/** The name of a road user, or a place in words. */
+export const text = (value: unknown): string => {
+  if (Array.isArray(value)) return t`x ${metres(value[0])} m, y ${metres(value[1])} m`;
+  return typeof value === "string" && value ? placeName(value) : "…";
+};
 
 export function amount(value: unknown, unit: string, scale = 1): string {
   const shown = shownAs(` ${unit}`);
