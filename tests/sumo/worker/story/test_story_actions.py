@@ -414,3 +414,22 @@ def test_the_point_behind_the_front_is_on_the_path_and_its_speed_is_that_of_the_
     # The point goes at 5 m/s, the front faster.
     arcs = 12.0 * turned
     assert np.diff(arcs) / np.diff(van.time[inside]) == pytest.approx(5.0, abs=0.1)
+
+
+@pytest.mark.slow
+def test_a_van_without_a_goal_goes_on_along_the_lane_into_which_it_has_cut(tmp_path: Path) -> None:
+    """The goal drawn for it is to the left of where it ends up; it stopped for a gap back there."""
+    name, west = "signal_crossing", math.pi
+    spawns = {
+        "van": node_at(name, 120.0, 0.0, hdg=west),
+        "ego": node_at(name, 140.0, 3.25, hdg=west),
+    }
+    actors = [
+        {
+            "id": one, "category": "van", "spawn": spawn, "speed": speed, "initial_speed": speed,
+        } for (one, spawn), speed in zip(spawns.items(), (3.5, 7.0), strict=True)
+    ]  # fmt: skip
+    actors[1]["goal"] = node_at(name, -146.0, 3.25, hdg=west)
+    rules = [after(1.0, {"cut_in": {"to": "ego", "over": 3.0}})]
+    found = run(document(name, actors, rules), tmp_path / "run")
+    assert found.tracks["van"].travelled[-1] == pytest.approx(3.5 * 20.0, abs=1.0)

@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from odscen.base.categories import Category
 from odscen.base.errors import ScenarioError
 from odscen.base.stored_files import stored_document
 from odscen.scenario.document.rules_document import StoryRule, places_of, rule_parts
@@ -50,6 +51,8 @@ class StoryPlan:
     by_story
         Speeds, m/s, at which the story alone begins to drive vehicles, by their ids; ``None`` is
         that at which one appears.
+    without_goal
+        Vehicles that rules move and that have no goal of their own: where they end up decides.
     """
 
     rules: tuple[StoryRule, ...]
@@ -57,6 +60,7 @@ class StoryPlan:
     signals: dict[tuple[str, str], tuple[str, int]] = field(default_factory=dict)
     held: Mapping[str, HeldActor] = field(default_factory=dict)
     by_story: Mapping[str, float | None] = field(default_factory=dict)
+    without_goal: tuple[str, ...] = ()
 
     def to_json(self) -> str:
         """One rule a line; the same plan gives the same text."""
@@ -71,6 +75,8 @@ class StoryPlan:
             head["held"] = {name: asdict(one) for name, one in self.held.items()}
         if self.by_story:
             head["by_story"] = dict(self.by_story)
+        if self.without_goal:
+            head["without_goal"] = list(self.without_goal)
         lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
         body = ",\n    ".join(rules)
         return "{\n" + ",\n".join(lines) + f',\n  "rules": [\n    {body}\n  ]\n}}\n'
@@ -94,6 +100,7 @@ class StoryPlan:
                     for name, one in data.get("held", {}).items()
                 },
                 data.get("by_story", {}),
+                tuple(data.get("without_goal", ())),
             )
 
 
@@ -112,7 +119,13 @@ def story_plan(
         actor.id: None if actor.id in held else actor.initial_speed or 0.0
         for actor in scenario.by_story
     }
-    plan = StoryPlan(scenario.rules, held=held, by_story=speeds)
+    moved = {rule.actor for rule in scenario.rules}
+    free = tuple(
+        actor.id
+        for actor in scenario.actors
+        if actor.id in moved and actor.goal is None and actor.category is not Category.PEDESTRIAN
+    )
+    plan = StoryPlan(scenario.rules, held=held, by_story=speeds, without_goal=free)
     for index, rule in enumerate(scenario.rules):
         for where, _, part in rule_parts(rule, f"rules[{index}]"):
             for name, place in places_of(part):

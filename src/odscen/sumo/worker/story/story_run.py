@@ -280,8 +280,12 @@ class StoryRun:
             self._goal_edges.setdefault(name, road.goal_edge(name))
             return
         edge = self._goal_edges.pop(name, None)
-        if edge is not None and road.goal_edge(name) != edge and not road.lead_to(name, edge):
+        if edge is None:
+            return
+        if road.goal_edge(name) != edge and not road.lead_to(name, edge):
             self._lose_way(name, "no route leads from where it is to its goal")
+        if name in self._plan.without_goal:  # it would stop for a gap back to the lane it came from
+            road.follow_lane(name, within=math.inf)
 
     def _allow_speed(self, road: MovedActors, name: str, speed: float | None) -> None:
         """Let a vehicle go faster than its type, while a rule wants it."""
