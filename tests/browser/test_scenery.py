@@ -129,3 +129,62 @@ def test_the_editor_shows_starts_and_plans_in_three_dimensions_and_places_there(
     assert len(user.document()["actors"]) == before + 1
     user.choose("View", "Plan")
     expect(stage).to_have_count(0)
+
+
+SECTIONS = [(0.0, 30.0), (0.0, -32.0), (34.0, 0.0), (-36.0, 0.0), (-60.0, 0.0)]
+"""Places on the four arms of the crossing, metres."""
+
+
+def road_edges(picture: np.ndarray, at: tuple[int, int], *, across: bool) -> tuple[int, int]:
+    """First and last pixel of asphalt, bluer than what is beside it, on a line over a road."""
+    column, row = at
+    line = (
+        picture[row, column - 45 : column + 45] if across else picture[row - 45 : row + 45, column]
+    )
+    asphalt = np.flatnonzero(line[:, 2] - line[:, 0] > 9.0)
+    assert asphalt.size > 12
+    return int(asphalt[0]), int(asphalt[-1])
+
+
+@pytest.mark.slow
+def test_from_straight_above_the_picture_is_the_plan_within_a_pixel(
+    open_page: Callable[..., OdscenPage], served: Served, sampled: str, tmp_path: Path
+) -> None:
+    user = open_page(served.url)
+    begun(user, sampled, speed=None)
+    expect(user.page.get_by_label("Moment of the run")).to_be_visible()
+    user.page.get_by_role("button", name="Zoom in").click()
+    user.page.wait_for_timeout(600)
+    stage = user.page.locator(".run-view")
+    box = stage.bounding_box()
+    assert box is not None
+    places = [
+        (round(x - box["x"]), round(y - box["y"])) for x, y in (user.map.at(*at) for at in SECTIONS)
+    ]
+    plan = colours(stage, str(tmp_path / "plan.png"))
+    user.choose("View", "3D, from above")
+    expect(user.page.locator(".scenery canvas")).to_be_visible()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    user.page.mouse.move(x, y - 100)
+    user.page.mouse.down(button="right")
+    user.page.mouse.move(x, y + 150, steps=10)
+    user.page.mouse.up(button="right")
+    user.page.wait_for_timeout(900)
+    above = colours(stage, str(tmp_path / "above.png"))
+    for place, (east, _) in zip(places, SECTIONS, strict=True):
+        seen = [road_edges(one, place, across=east == 0.0) for one in (plan, above)]
+        assert np.abs(np.subtract(*seen)).max() <= 1, (place, seen)
+    # The left button moves the map, and the wheel brings it nearer.
+    user.page.mouse.move(x, y)
+    user.page.mouse.down()
+    user.page.mouse.move(x + 60, y, steps=5)
+    user.page.mouse.up()
+    user.page.wait_for_timeout(900)
+    moved = colours(stage, str(tmp_path / "moved.png"))
+    column, row = places[0]
+    before = road_edges(above, (column, row), across=True)
+    after = road_edges(moved, (column + 60, row), across=True)
+    assert np.abs(np.subtract(before, after)).max() <= 2
+    user.page.mouse.wheel(0, -300)
+    user.page.wait_for_timeout(900)
+    assert np.abs(colours(stage, str(tmp_path / "near.png")) - moved).mean() > 2

@@ -29,6 +29,7 @@ import { ScaleBar } from "./ScaleBar";
 import type { Mark, Moving, Scene } from "./scene";
 import { useUnderlay, useUnderlays } from "./underlay";
 import { useMeasure } from "./useMeasure";
+import { hasOwnPointer } from "./ownPointer";
 import { clampTo, fit, panBy, type Size, toWorld, type View, visible, zoomAt } from "./view";
 import { legendRows } from "./writtenLegend";
 import { IN_ADDRESS, type KeptPlace } from "../ui/kept";
@@ -321,7 +322,7 @@ export function MapCanvas({
       onKeyDown={onKeyDown}
       onBlur={() => setCrosshair(false)}
       onPointerDown={(event) => {
-        if (event.button > 1) return;
+        if (event.button > 1 || hasOwnPointer(event.target)) return;
         setCrosshair(false);
         event.currentTarget.setPointerCapture(event.pointerId);
         const [x, y] = local(event);
@@ -332,6 +333,7 @@ export function MapCanvas({
         drag.current = { from: [x, y], last: [x, y], moved: false, does, line: [] };
       }}
       onPointerMove={(event) => {
+        if (hasOwnPointer(event.target)) return;
         const [x, y] = local(event);
         const held = drag.current;
         if (!held) {

@@ -8,6 +8,7 @@ import type { HeightColumns } from "../api/types";
 import type { PackedDrawing } from "../map/drawing";
 import type { Graph } from "../map/graph";
 import type { Pointed } from "../map/MapCanvas";
+import { OWN_POINTER } from "../map/ownPointer";
 import type { View } from "../map/view";
 import { tell } from "../ui/notices";
 import type { Camera } from "./cameras";
@@ -37,13 +38,7 @@ export function OverMap({
   onReady: () => void;
 }) {
   return (
-    <div
-      className="run-scenery"
-      // The map below is not meant.
-      onPointerDown={(event) => event.stopPropagation()}
-      onPointerMove={(event) => event.stopPropagation()}
-      onPointerUp={(event) => event.stopPropagation()}
-    >
+    <div className="run-scenery" {...{ [OWN_POINTER]: "" }}>
       <Suspense fallback={<Loader aria-label={t`Loading the view in 3D`} />}>
         <SceneryView
           {...props}

@@ -82,9 +82,13 @@ export default function SceneryView({
     made.lookAt(newest.current.from() ?? { x: (x0 + x1) / 2, y: (y0 + y1) / 2, scale: 1 }, FIRST_TILT);
     const watched = new ResizeObserver(fitted);
     watched.observe(element);
+    // The plan below stays as it is.
+    const stop = (event: Event): void => event.stopPropagation();
+    element.addEventListener("wheel", stop);
     newest.current.onReady();
     return () => {
       watched.disconnect();
+      element.removeEventListener("wheel", stop);
       made.destroy();
       scenery.current = null;
     };

@@ -100,7 +100,9 @@ export class CrowdOfBodies {
     const painted = new MeshLambertMaterial({ vertexColors: true });
     const glowing = (color: number): MeshBasicMaterial => new MeshBasicMaterial({ color });
     this.bodies = CATEGORIES.map((category) => new Bodies(this.group, body(category), painted));
-    this.far = new Bodies(this.group, farBody(), painted);
+    // From afar a pixel of the road is longer than a body is high: bodies lie above all coats of paint.
+    const lifted = { polygonOffset: true, polygonOffsetFactor: -6, polygonOffsetUnits: -40 };
+    this.far = new Bodies(this.group, farBody(), new MeshLambertMaterial({ vertexColors: true, ...lifted }));
     const mirrored = indicators().scale(1, -1, 1);
     mirrored.setIndex([...Array(mirrored.getAttribute("position").count).keys()].reverse());
     this.lamps = {

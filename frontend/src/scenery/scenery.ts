@@ -7,6 +7,7 @@ import {
   DoubleSide,
   FogExp2,
   Frustum,
+  Group,
   HemisphereLight,
   LineBasicMaterial,
   LineSegments,
@@ -36,6 +37,7 @@ import { blocks, type HeightAt, type Origin, ribbons, surface, tiles } from "./g
 import type { Heights } from "./heights";
 import { drawsInSoftware, Sharpness } from "./sharpness";
 import { Lights, signs } from "./signs";
+import { StillPicture } from "./still";
 import { skyOf, type Sky } from "./weather";
 
 /** Metres between paint and what it lies on, so that it is not lost in it from afar. */
@@ -56,6 +58,8 @@ const HAIR = 0.12;
 /** Milliseconds without a change after which a picture is drawn as sharp as can be. */
 const STILL = 250;
 const TILT = Math.PI / 2 - 0.05;
+/** Metres from a camera at which anything is seen, and from above the share of how far away the ground is. */
+const [NEAR, NEAR_SHARE] = [0.4, 0.04];
 
 /** A map and its road users in three dimensions; drawn when something has changed. */
 export class Scenery {
@@ -68,7 +72,15 @@ export class Scenery {
   private settling = 0;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(ANGLE.above, 1, 0.4, 6000);
+  /** What stays as it is. */
+  private readonly town = new Group();
+  /** What moves, or changes by itself. */
+  private readonly life = new Group();
+  private readonly still: StillPicture;
+  /** From where the town was seen last, and whether there is a picture of it from there. */
+  private seenFrom: number[] = [];
+  private kept = false;
+  private readonly camera = new PerspectiveCamera(ANGLE.above, 1, NEAR, 6000);
   private readonly controls: MapControls;
   private readonly origin: Origin;
   private readonly crowd: CrowdOfBodies;
@@ -97,6 +109,7 @@ export class Scenery {
     const probe = document.createElement("canvas").getContext("webgl2");
     this.renderer = new WebGLRenderer({ antialias: !drawsInSoftware(probe) });
     probe?.getExtension("WEBGL_lose_context")?.loseContext();
+    this.still = new StillPicture(this.renderer.getContext());
     this.sharpness = new Sharpness(pixelRatio);
     this.shown = pixelRatio;
     this.canvas = this.renderer.domElement;
@@ -114,7 +127,8 @@ export class Scenery {
     this.around.position.set(0, 0, 1);
     this.scene.add(this.around, this.glow, this.sun, this.sun.target);
     this.build(drawing);
-    this.scene.add(this.crowd.group, this.lights.group, this.rain);
+    this.life.add(this.crowd.group, this.lights.group, this.rain);
+    this.scene.add(this.town, this.life);
     this.setWeather({});
   }
 
@@ -126,7 +140,8 @@ export class Scenery {
 
   setWeather(values: Readonly<Record<string, number>>): void {
     const sky: Sky = skyOf(values);
-    this.scene.background = sky.color;
+    // Not the background of the scene: that is drawn over a picture that is kept.
+    this.renderer.setClearColor(sky.color);
     this.scene.fog = new FogExp2(sky.color, sky.fog);
     this.around.color = sky.color.clone().lerp(new Color(0xffffff), 0.6);
     this.around.intensity = OPEN_SKY * sky.ambient;
@@ -147,6 +162,7 @@ export class Scenery {
         .multiply(light)
         .multiplyScalar(road ? 1 - 0.4 * sky.wet : 1)
         .convertLinearToSRGB();
+    this.seenFrom = [];
     this.mark();
   }
 
@@ -243,6 +259,7 @@ export class Scenery {
         for (const material of [one.material].flat() as Material[]) material.dispose();
       }
     });
+    this.still.drop();
     this.renderer.dispose();
     this.canvas.remove();
   }
@@ -263,7 +280,7 @@ export class Scenery {
         // What lies on top first: what it hides is then not painted.
         mesh.renderOrder = UPPERMOST - coats;
         if (Number.isFinite(width)) this.thin.push({ mesh, width });
-        this.scene.add(mesh);
+        this.town.add(mesh);
       }
     };
     const levels = new Set([...drawing.areas, ...drawing.marks].map(([level]) => level));
@@ -291,8 +308,8 @@ export class Scenery {
     const tall = (ring: number): number => STOREYS[ring % STOREYS.length] ?? 8;
     const walls = blocks(drawing.buildings, origin, this.heightAt(), tall);
     if (walls.getAttribute("position").count > 0)
-      this.scene.add(new Mesh(walls, new MeshLambertMaterial({ color: LIGHT.building, side: DoubleSide })));
-    this.scene.add(signs(drawing.symbols, origin, this.heightAt()));
+      this.town.add(new Mesh(walls, new MeshLambertMaterial({ color: LIGHT.building, side: DoubleSide })));
+    this.town.add(signs(drawing.symbols, origin, this.heightAt()));
   }
 
   /** Light on what is level, as the matt materials of three.js have it. */
@@ -357,6 +374,10 @@ export class Scenery {
   /** Places the road users, and shows the marks, that the camera sees. */
   private showSeen(): void {
     const { camera } = this;
+    // The depths of a picture are finest near by: from high above roofs would be lost in the road.
+    const away = this.mode === "above" ? camera.position.distanceTo(this.controls.target) : 0;
+    camera.near = Math.max(NEAR, NEAR_SHARE * away);
+    camera.updateProjectionMatrix();
     camera.updateMatrixWorld();
     const seen = new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
     const span = this.size.height / (2 * Math.tan((camera.fov * Math.PI) / 360));
@@ -367,8 +388,8 @@ export class Scenery {
     });
     for (const { mesh, width } of this.thin) {
       const ball = mesh.geometry.boundingSphere;
-      const away = ball ? camera.position.distanceTo(ball.center) - ball.radius : 0;
-      mesh.visible = width * span > HAIR * away;
+      const apart = ball ? camera.position.distanceTo(ball.center) - ball.radius : 0;
+      mesh.visible = width * span > HAIR * apart;
     }
   }
 
@@ -402,9 +423,38 @@ export class Scenery {
 
   private draw(began: number): void {
     this.showSeen();
-    this.renderer.render(this.scene, this.camera);
+    this.render();
     this.stats.frames += 1;
     this.stats.busy += performance.now() - began;
+  }
+
+  /** Draws all, or adds what moves to a picture of the town while the camera stands still. */
+  private render(): void {
+    const { width, height } = this.canvas;
+    const from = [
+      ...this.camera.matrixWorld.elements,
+      ...this.camera.projectionMatrix.elements,
+      width,
+      height,
+    ];
+    if (from.some((number, k) => number !== this.seenFrom[k])) {
+      this.kept = false;
+      this.seenFrom = from;
+      this.renderer.render(this.scene, this.camera);
+      return;
+    }
+    if (this.kept) this.still.show(width, height);
+    else {
+      this.life.visible = false;
+      this.renderer.render(this.scene, this.camera);
+      this.life.visible = true;
+      this.kept = this.still.keep(width, height);
+    }
+    this.renderer.autoClear = false;
+    this.town.visible = false;
+    this.renderer.render(this.scene, this.camera);
+    this.town.visible = true;
+    this.renderer.autoClear = true;
   }
 
   /** Reads a pixel back: the only sign that a picture is finished, not only ordered. */
