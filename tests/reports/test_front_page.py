@@ -1,3 +1,4 @@
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -84,6 +85,12 @@ def test_movements_are_named_by_approach_and_turn():
 def test_two_legs_on_one_side_are_told_apart_by_their_streets():
     names = PlaceNames({}, {"r1": "A Road", "r4": "B Road"}, {"j1": {"r1": 0.1, "r4": -0.1}})
     assert names.name_movement("r1>j1>r4", junction="j1") == "from the east (A Road), U-turn"
+
+
+def test_movements_of_signal_groups_are_said_by_the_side_from_which_they_come():
+    names = PlaceNames({}, {}, {"j1": {"r1": 0.1, "r4": math.pi / 2.0}})
+    said = names.name_approaches("j1", "r1, r4 left, walk r4, r9 right")
+    assert said == "from the east, from the north left, crossing in the north, r9 right"
 
 
 def test_junctions_of_one_name_are_told_apart_by_the_compass():

@@ -91,6 +91,31 @@ class PlaceNames:
         words = f"from the {self._name_side(middle, parts[0])}, {_name_turn(legs, parts)}"
         return words if middle == junction else f"{self.name_junction(middle)}, {words}"
 
+    def name_approaches(self, junction: str, movements: str) -> str:
+        """Movements of a signal group: ``"from the west, from the east left"``.
+
+        Parameters
+        ----------
+        junction
+            Segment id of the junction.
+        movements
+            As signal groups have them, joined by commas: ``r1``, ``r1 left``, ``walk r1``.
+        """
+        legs = self.legs.get(junction, {})
+        words = []
+        for movement in movements.split(", "):
+            parts = movement.split(" ")
+            walk = parts[0] == "walk"
+            segment, *turn = parts[1:] if walk else parts
+            if segment not in legs:
+                words.append(movement)
+                continue
+            side = self._name_side(junction, segment)
+            words.append(
+                f"crossing in the {side}" if walk else " ".join([f"from the {side}", *turn])
+            )
+        return ", ".join(words)
+
     def name_lane_group(self, lane_group: str) -> str:
         """Movements of a lane group, joined by ``+``, in words."""
         movements = lane_group.split(" + ")

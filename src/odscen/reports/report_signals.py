@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.base.markup import number
 from odscen.figures.measures.figure import ReportSection
+from odscen.reports.place_names import NO_NAMES
 from odscen.reports.report_cards import figure_cards
 from odscen.reports.signal_charts import bar_chart, plan_chart, shown_bars
 from odscen.reports.signal_pictures import (
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from odscen.base.markup import Markup
     from odscen.drawing.map_drawing import MapDrawing
     from odscen.records.light_programs import LightProgram
+    from odscen.reports.place_names import PlaceNames
 
 MOST_LIGHTS = 8
 """Lights that are drawn, at most: those with programs of the scenario, then the worst."""
@@ -49,7 +51,11 @@ class LightsOfRun(NamedTuple):
 
 
 def signal_values(
-    lights: LightsOfRun, values: Mapping[str, Any], *, drawing: MapDrawing | None = None
+    lights: LightsOfRun,
+    values: Mapping[str, Any],
+    *,
+    drawing: MapDrawing | None = None,
+    names: PlaceNames = NO_NAMES,
 ) -> dict[str, Any] | None:
     """Cards over all lights; for each that is shown its stages, its time bars and its groups.
 
@@ -57,6 +63,8 @@ def signal_values(
     ----------
     drawing
         Of the map, for the shapes of junctions.
+    names
+        Of the junctions and of their approaches.
     """
     if not lights.programs:
         return None
@@ -67,7 +75,9 @@ def signal_values(
         "split_heads": SPLIT_HEADS,
         "detector_heads": DETECTOR_HEADS,
         "lights": [
-            _light_values(light, lights, JunctionPictures(light, drawing, ident=f"ground-{place}"))
+            _light_values(
+                light, lights, JunctionPictures(light, drawing, ident=f"ground-{place}"), names
+            )
             for place, light in enumerate(chosen)
         ],
         "more": len(lights.programs) - len(chosen),
@@ -86,14 +96,15 @@ def _choose_lights(lights: LightsOfRun) -> list[LightProgram]:
 
 
 def _light_values(
-    light: LightProgram, lights: LightsOfRun, pictures: JunctionPictures
+    light: LightProgram, lights: LightsOfRun, pictures: JunctionPictures, names: PlaceNames
 ) -> dict[str, Any]:
     columns = (
         "group", "movements", "greens", "mean_green", "vehicles", "cycle_failures", "unused_green",
     )  # fmt: skip
+    middle = f"j{light.junctions[0]}"
     used = lights.use.filter(lights.use["junction"] == light.junctions[0]).select(columns)
     return {
-        "junctions": light.junctions,
+        "name": _name_light(light, names),
         "control": {"fixed": "fixed-time", "actuated": "actuated"}[light.control],
         "own": light.own,
         "ground": pictures.ground(),
@@ -114,11 +125,20 @@ def _light_values(
         "groups": [
             [
                 "" if value is None else number(value, 1) if isinstance(value, float) else value
-                for value in row
+                for value in (group, names.name_approaches(middle, movements), *rest)
             ]
-            for row in used.iter_rows()
+            for group, movements, *rest in used.iter_rows()
         ],
     }
+
+
+def _name_light(light: LightProgram, names: PlaceNames) -> str:
+    """Names of the junctions of a light, with the ids by which the page has them."""
+    known = [names.junctions.get(f"j{junction}") for junction in light.junctions]
+    ids = ", ".join(light.junctions)
+    if not all(known):
+        return f"Junction {ids}"
+    return f"{', '.join(filter(None, known))} (junction {ids})"
 
 
 def _states_chart(light: LightProgram, states: pl.DataFrame) -> Markup:

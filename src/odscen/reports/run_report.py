@@ -213,7 +213,9 @@ def render_report(
             flow=flow_values(figures.network) if figures else None,
             diagram=diagram_values(figures.network) if figures else None,
             corridor=corridor_values(corridor, names) if corridor is not None else None,
-            signals=signal_values(lights, given, drawing=drawing) if lights is not None else None,
+            signals=signal_values(lights, given, drawing=drawing, names=names)
+            if lights is not None
+            else None,
             transit=_transit_values(visits, given) if visits is not None else None,
             parking=_parking_values(parking, given) if parking is not None else None,
             assignment=assignment_values(assignment) if assignment is not None else None,
@@ -221,7 +223,7 @@ def render_report(
             progress=_progress_values(actors, end),
             conflicts=conflict_values(conflicts) if conflicts is not None else None,
             walking=_walking_values(given, actors, traces, end=end),
-            motion=motion_values(motion, values) if motion is not None else None,
+            motion=motion_values(motion, values, names) if motion is not None else None,
             emissions=emission_values(figures, names) if figures else None,
             criteria=asked,
             expectations=summary.get("expectations") or (),
@@ -360,13 +362,15 @@ MOST_MOTIONS = 20
 """Findings of the check of motion that are listed."""
 
 
-def _value_of_motion(row: Mapping[str, Any]) -> str:
-    """Value of a finding with its unit as it is printed."""
+def _value_of_motion(row: Mapping[str, Any], column: str = "value") -> str:
+    """Value, or bound, of a finding with its unit as it is printed."""
     unit = KIND_UNITS[MotionKind(row["kind"])].replace("s2", "s²").replace("s3", "s³")
-    return f"{number(row['value'], 2)} {unit}"
+    return f"{number(row[column], 2)} {unit}"
 
 
-def motion_values(found: pl.DataFrame, values: Mapping[str, Any]) -> dict[str, Any]:
+def motion_values(
+    found: pl.DataFrame, values: Mapping[str, Any], names: PlaceNames = NO_NAMES
+) -> dict[str, Any]:
     """Findings of the check of motion: by kind, category and cause, and the worst of each kind."""
     counted = [
         (
@@ -376,7 +380,7 @@ def motion_values(found: pl.DataFrame, values: Mapping[str, Any]) -> dict[str, A
             number(row["findings"], 0),
             number(row["users"], 0),
             _value_of_motion(row),
-            number(row["bound"], 2),
+            _value_of_motion(row, "bound"),
         )
         for row in count_by_kind(found).iter_rows(named=True)
     ]
@@ -392,8 +396,7 @@ def motion_values(found: pl.DataFrame, values: Mapping[str, Any]) -> dict[str, A
             row["kind"],
             row["id"] if row["partner"] is None else f"{row['id']}, {row['partner']}",
             number(row["begin"], 1),
-            f"x {number(row['x'], 0)} m, y {number(row['y'], 0)} m",
-            row["lane"] or "-",
+            names.describe_spot(row["x"], row["y"]),
             _value_of_motion(row),
             row["cause"],
         )
