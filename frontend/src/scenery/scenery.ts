@@ -428,7 +428,7 @@ export class Scenery {
     this.stats.busy += performance.now() - began;
   }
 
-  /** Draws all, or adds what moves to a picture of the town while the camera stands still. */
+  /** Draws all, or adds what moves to a picture of the town while the camera stays. */
   private render(): void {
     const { width, height } = this.canvas;
     const from = [
