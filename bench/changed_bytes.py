@@ -224,7 +224,8 @@ def _sweep_readers(folder: Folder) -> dict[str, Reader]:
 
 
 def _dataset_readers(folder: Folder) -> dict[str, Reader]:
-    from odscen.experiments.datasets import make_dataset, read_dataset_plan
+    from odscen.experiments.dataset_plan import read_dataset_plan
+    from odscen.experiments.datasets import make_dataset
     from odscen.experiments.work import LocalExecutor
     from odscen.maps.store import Workspace
 

@@ -2,9 +2,10 @@
 
 Each reader has an environment of its own in ``build/interchange``, made once, with pinned versions.
 Scenarios of the runs go through a ``HeteroData`` and back, and must have the same bytes.
-Runs of three maps are exported in each format, read there, and compared with what the runs
-recorded: each track, each position, all lanes. ``--maps FOLDER`` takes all maps of a folder instead
-of three that ship. The table goes to ``build/interchange/results.json`` as well.
+Runs of three maps, and a dataset of them, are exported in each format, read there, and compared
+with what the runs recorded: each track, each position, all lanes. ``--maps FOLDER`` takes all maps
+of a folder instead of three that ship. The table goes to ``build/interchange/results.json`` as
+well.
 """
 
 from __future__ import annotations
@@ -12,9 +13,11 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import shutil
 import subprocess
 import sys
 import venv
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,11 +26,14 @@ from odscen.app.exchange.exports import export, export_run
 from odscen.app.generation import generate
 from odscen.app.running.batches import run_many
 from odscen.app.scenarios import read_scenario
+from odscen.experiments.dataset_plan import DatasetPlan
+from odscen.experiments.datasets import folder_name, make_dataset
 from odscen.maps.store import Workspace
 from odscen.runs.finished_run import Run
 from odscen.runs.layout import SCENARIO_FILE
 from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.json_form import dumps
+from odscen.scenario.document.problems import validated
 from odscen.scenario.sampling.generation_settings import GenerationSettings
 
 ROOT = Path(__file__).parents[1]
@@ -46,6 +52,7 @@ class Reader:
 
     ``{site}`` is the folder of the environment's packages; ``of`` names the reader that shares its
     environment. ``format`` is what is exported, unless it is called as the reader, ``options`` how.
+    One ``of_dataset`` is given the folder of a whole dataset in place of an export.
     """
 
     ending: str
@@ -54,6 +61,7 @@ class Reader:
     format: str | None = None
     options: tuple[tuple[str, str], ...] = ()
     exact: bool = False
+    of_dataset: bool = False
 
 
 READERS = {
@@ -89,6 +97,14 @@ READERS = {
     "osi-mcap": Reader(
         ".mcap", (), of="osi-utilities", format="osi", options=(("container", "mcap"),), exact=True
     ),
+    "huggingface": Reader("", (("datasets==5.2.0",),), of_dataset=True),
+    # torch's DataLoader and JAX, by odscen.datasets.
+    "batches": Reader(
+        "",
+        (("torch==2.13.0",), ("jax==0.10.2", "webdataset==1.0.2", "typing-extensions")),
+        of_dataset=True,
+    ),
+    "webdataset": Reader("", (), of="batches", of_dataset=True),
 }  # fmt: skip
 
 
@@ -130,6 +146,49 @@ def recorded_runs(
         made = run_many(workspace, paths, settings=settings, reports=False)
         runs += [(workspace, run) for run in made]
     return runs
+
+
+def recorded_dataset(runs: list[tuple[Workspace, Run]], *, seconds: float, fill: float) -> Path:
+    """Folder of a dataset in the formats of arrays: two runs of each map, with their folders."""
+    workspace, _ = runs[0]
+    out = BUILD / "dataset"
+    shutil.rmtree(out, ignore_errors=True)
+    maps = sorted({str(run.summary["map"]) for _, run in runs})
+    plan = {
+        "name": "interchange",
+        "licence": "CC0-1.0",
+        "formats": ["pyg", "webdataset", "huggingface"],
+        "splits": {"test": maps[:1], "train": ["*"]},
+        "shard": 3,
+        "study": {
+            "sample": [{"maps": maps, "count": 2, "fill": fill}],
+            "run": {"until": seconds, "step_length": STEP},
+            "keep": "all",
+        },
+    }
+    make_dataset(workspace, validated(DatasetPlan, plan), out)
+    return out
+
+
+def read_whole(name: str, workspace: Workspace, folder: Path) -> Iterator[dict[str, Any]]:
+    """Read a dataset, and compare each run of it."""
+    rows_file = folder / "read.json"
+    counts = _told(name, folder, rows_file)
+    rows = json.loads(rows_file.read_text())
+    rows_file.unlink()
+    runs = {
+        folder_name(path.parent.relative_to(folder / "study" / "runs").as_posix()): path.parent
+        for path in sorted((folder / "study" / "runs").rglob("summary.json"))
+    }
+    entries = {entry.sha256: entry for entry in workspace.maps()}
+    used = {str(Run.open(one).summary["map_sha256"]) for one in runs.values()}
+    lanes = sorted(len(entries[one].graph().lanes.lanes.keys) for one in used)
+    for run, own in runs.items():
+        yield {
+            "format": name, "run": run, "runs": counts["runs"], "expected_runs": len(runs),
+            "map_lanes": sorted(counts["map_lanes"]), "expected_map_lanes": lanes,
+            **compare(Run.open(own), name, rows.get(run, []), {}),
+        }  # fmt: skip
 
 
 def come_back(workspace: Workspace, run: Run) -> dict[str, Any]:
@@ -241,6 +300,8 @@ def check(result: dict[str, Any]) -> list[str]:
             for words, well in (("other bytes", result["same_bytes"]), ("other nodes", nodes))
             if not well
         ]
+    if READERS[result["format"]].of_dataset:
+        return _check_whole(result)
     never = ("missing_states", "extra_states", "states_missed_by_checker")
     wrong = [f"{one} {result[one]}" for one in never if result.get(one)]
     if result["read_tracks"] != result["recorded_tracks"]:
@@ -258,6 +319,22 @@ def check(result: dict[str, Any]) -> list[str]:
     return wrong
 
 
+def _check_whole(result: dict[str, Any]) -> list[str]:
+    """What is wrong with a run of a dataset."""
+    wrong = [f"{one} {result[one]}" for one in ("missing_states", "extra_states") if result[one]]
+    wrong += [
+        f"{result[one]} {one}, not {result[f'expected_{one}']}"
+        for one in ("runs", "map_lanes")
+        if result[one] != result[f"expected_{one}"]
+    ]
+    off = (("m", EXACT_METRES), ("rad", EXACT_RADIANS))
+    return wrong + [
+        f"{result[f'max_error_{unit}']} {unit} off"
+        for unit, most in off
+        if result[f"max_error_{unit}"] > most
+    ]
+
+
 def main() -> int:
     """Read all; 1 if something is wrong."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -270,16 +347,28 @@ def main() -> int:
     maps = given.maps or [ROOT / "maps" / f"{name}.xodr" for name in SHIPPED]
     runs = recorded_runs(maps, seconds=given.seconds, fill=given.fill, each=given.each)
     results, failed = [], False
-    for name in given.formats or READERS:
-        for workspace, run in runs:
-            back = name == "arrays"
-            result = come_back(workspace, run) if back else read(name, workspace, run)
+    names = given.formats or list(READERS)
+    dataset = None
+    if any(READERS[name].of_dataset for name in names):
+        dataset = recorded_dataset(runs, seconds=given.seconds, fill=given.fill)
+    for name in names:
+        for result in _read_by(name, runs, dataset):
             wrong = check(result)
             failed |= bool(wrong)
             print(f"{name} {result['run']}: {'; '.join(wrong) or 'ok'}", json.dumps(result))
             results.append(result)
     (BUILD / "results.json").write_text(json.dumps(results, indent=1) + "\n")
     return int(failed)
+
+
+def _read_by(
+    name: str, runs: list[tuple[Workspace, Run]], dataset: Path | None
+) -> Iterator[dict[str, Any]]:
+    if READERS[name].of_dataset and dataset is not None:
+        yield from read_whole(name, runs[0][0], dataset)
+        return
+    for workspace, run in runs:
+        yield come_back(workspace, run) if name == "arrays" else read(name, workspace, run)
 
 
 if __name__ == "__main__":

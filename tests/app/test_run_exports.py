@@ -22,11 +22,20 @@ import polars as pl
 import pytest
 from lxml import etree, html
 
-from odscen.app.exchange.exports import contents_of, export, export_run, export_runs, run_contents
+from odscen.app.exchange.dataset_exports import ARRAYS, dataset_contents, dataset_map
+from odscen.app.exchange.exports import (
+    contents_of,
+    export,
+    export_run,
+    export_runs,
+    run_contents,
+    run_source,
+)
 from odscen.app.exchange.recorded_traffic import read_recorded_traffic
 from odscen.app.running import reports
 from odscen.app.running.batches import run_many
 from odscen.base.errors import DamagedError, InputError
+from odscen.base.text_files import write_file
 from odscen.formats import list_formats
 from odscen.formats.base import RecordedRun
 from odscen.formats.recordings.tfrecord import read_tfrecord
@@ -75,9 +84,38 @@ def test_formats_written_together_have_the_bytes_of_each_alone(
 ) -> None:
     whole = {name: {} for name in FORMATS}
     monkeypatch.setattr("odscen.opendrive.parse.parse", None)  # the map has been read by then
-    for name, files_of in run_contents(workspace, run.folder, whole).items():
+    for name, files_of in run_contents(run_source(workspace, run.folder), whole).items():
         alone = {one.name: one.read_bytes() for one in (exports / name).iterdir()}
         assert contents_of(files_of) == alone, name
+
+
+def test_arrays_whose_map_lies_beside_say_the_same(
+    workspace: Workspace, run: Run, exports: Path, tmp_path: Path
+) -> None:
+    whole = read_arrays(_file(exports, "pyg/*.npz"))
+    light = tmp_path / "light.npz"
+    (content,) = dataset_contents(workspace, run.folder, [ARRAYS])[ARRAYS].values()
+    light.write_bytes(content)
+    shared = dataset_map(workspace, run.summary["map"], run.summary["map_sha256"])
+    write_file(tmp_path / shared.file, shared.content)
+    found = read_arrays(light)
+    assert found.keys() == whole.keys()
+    assert np.abs(found["agent_state"] - whole["agent_state"]).max() <= 0.5 / 16384
+    for name in whole.keys() - {"about", "agent_state"}:
+        assert found[name].dtype == whole[name].dtype
+        assert np.array_equal(found[name], whole[name], equal_nan=whole[name].dtype.kind == "f")
+
+
+def test_numbers_of_a_recording_are_those_of_its_states(workspace: Workspace, run: Run) -> None:
+    said = json.loads(dataset_contents(workspace, run.folder, [])["statistics"]["statistics.json"])
+    table = run.trajectories()
+    speeds = table["speed"].cast(float)
+    of_all = said["categories"].values()
+    assert sum(one["tracks"] for one in of_all) == table["id"].n_unique()
+    assert sum(sum(one["speeds"]) for one in of_all) == table.height
+    assert sum(one["speeds"][0] for one in of_all) == (speeds < 0.1).sum()
+    metres = sum(one["metres"] for one in of_all)
+    assert metres == pytest.approx(speeds.sum() * 0.1, abs=0.1 * len(of_all))
 
 
 def _file(exports: Path, pattern: str) -> Path:

@@ -8,10 +8,14 @@ import pickle
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
+from odscen.app.exchange.dataset_exports import ARRAYS, STATISTICS, STATISTICS_FILE, dataset_map
 from odscen.base.errors import ConflictError, InputError, ScenarioError
-from odscen.experiments.datasets import DatasetPlan, make_dataset, read_dataset_plan
+from odscen.base.given_arrays import npz_bytes
+from odscen.experiments.dataset_plan import DatasetPlan, read_dataset_plan
+from odscen.experiments.datasets import make_dataset
 from odscen.experiments.work import LocalExecutor, Outcome
 from odscen.formats.recordings.tfrecord import tfrecord
 from odscen.formats.scenarionet_format import pickled
@@ -59,13 +63,36 @@ class MadeUpExports:
                     yield [Outcome(run.name, row)]
                     continue
                 name = run.name.replace("/", "-")
-                exports = {one: _files(one, name) for one in order.formats}
+                sha256 = order.sources[run.scenario].map_sha256
+                exports = {
+                    one: _files(one, name, run.scenario[:-5], sha256) for one in order.formats
+                }
+                numbers = {
+                    "tracks": 3,
+                    "seconds": 9.0,
+                    "metres": 45.0,
+                    "speeds": [30, *9 * [0], 60],
+                }
+                said = {"seconds": 10.0, "lights": seed, "categories": {"car": numbers}}
+                exports[STATISTICS] = {STATISTICS_FILE: json.dumps(said).encode()}
                 yield [Outcome(run.name, row, None, exports)]
 
 
-def _files(form: str, name: str) -> dict[str, bytes]:
-    if form == "pyg":
-        return {f"{name}.npz": name.encode()}
+def _files(form: str, name: str, map_name: str, sha256: str) -> dict[str, bytes]:
+    if form == ARRAYS:
+        shared = dataset_map(place(), map_name, sha256)
+        about = {"format": "odscen-arrays", "version": 2, "map": map_name, "map_sha256": sha256}
+        about |= {"run": name, "scenario": name[:-20], "seed": 1, "recorded_step": 0.1}
+        about |= {"interpolated": False}
+        about |= {"map_file": shared.file, "map_file_sha256": shared.sha256}
+        arrays = {
+            "about": np.array(json.dumps(about)),
+            "time": np.array([0.0, 0.1]),
+            "agent_id": np.array(["a", "b"]),
+            "agent_state": np.arange(20.0).reshape(2, 2, 5),
+            "light_color": np.zeros((0, 2), dtype=np.uint8),
+        }
+        return {f"{name}.npz": npz_bytes(arrays, deflated=True)}
     if form == "waymo":
         listed = json.dumps({"run": name}).encode()
         return {f"{name}.tfrecord": tfrecord([name.encode()]), f"{name}.export.json": listed}
@@ -97,7 +124,7 @@ def contents(out: Path) -> dict[str, bytes]:
 
 @pytest.mark.slow
 def test_a_dataset_that_was_killed_twice_is_that_of_one_go(tmp_path: Path) -> None:
-    asked = plan(formats=["pyg", "scenarionet", "waymo"], shard=2)
+    asked = plan(formats=["pyg", "scenarionet", "waymo", "webdataset", "huggingface"], shard=2)
     killed, ran = tmp_path / "killed", []
     for most in (2, 3):
         executor = MadeUpExports(most=most)
@@ -135,12 +162,17 @@ def test_shards_are_by_split_and_of_the_size_asked_for(tmp_path: Path) -> None:
     asked = plan(formats=["pyg", "scenarionet", "waymo"], shard=2, keep_if=["planned >= 1"])
     facts = made(tmp_path, asked, MadeUpExports())
     names = sorted(contents(tmp_path))
+    junction, crossing = (
+        entry(name).sha256[:12] for name in ("t_junction_signs", "signal_crossing")
+    )
     shards = [name for name in names if "/pyg/" in name]
-    assert shards == [
+    assert sorted(shards, key=lambda name: (name[:4], "maps" in name)) == [
         "test/pyg/shard-00000/t_junction_signs-0001-as-designed-seed-1.npz",
         "test/pyg/shard-00000/t_junction_signs-0002-as-designed-seed-1.npz",
+        f"test/pyg/shard-00000/maps/t_junction_signs-{junction}.npz",
         "train/pyg/shard-00000/signal_crossing-0001-as-designed-seed-1.npz",
         "train/pyg/shard-00000/signal_crossing-0002-as-designed-seed-1.npz",
+        f"train/pyg/shard-00000/maps/signal_crossing-{crossing}.npz",
     ]
     assert facts.left_out == {"failed: out of luck": 1, "not planned >= 1": 1}
     assert not (tmp_path / "staged").exists()
@@ -160,6 +192,13 @@ def test_the_card_has_maps_splits_versions_and_what_was_left_out(tmp_path: Path)
     card = (tmp_path / "README.md").read_text("utf-8")
     said = json.loads((tmp_path / "dataset.json").read_text("utf-8"))
     assert "Licence: CC-BY-4.0" in card
+    # Of 90 states 30 stand and 60 have up to 5 m/s; two runs of three cars in each split.
+    assert "| train | car | 6 | 0.01 | 0.1 | 5.0 | 5.0 | 5.0 | 33 |" in card
+    row = "| signal_crossing | train | 2 | 20 | 2 | 6 | 0.01 | 0.1 | 5.0 | 5.0 | 5.0 | 33 |"
+    assert row in card
+    picture = f"pictures/signal_crossing-{entry('signal_crossing').sha256[:12]}.svg"
+    assert f"![signal_crossing]({picture})" in card
+    assert (tmp_path / picture).read_text("utf-8").startswith("<")
     assert "| 1 | failed: out of luck |" in card
     assert [(one["name"], one["split"]) for one in said["maps"]] == [
         ("signal_crossing", "train"), ("t_junction_signs", "test"),
@@ -189,6 +228,14 @@ def test_a_map_without_a_split_is_refused(tmp_path: Path) -> None:
         ({"formats": ["pyg", "pyg"]}, "a format twice"),
         ({"keep_if": ["luck > 3"]}, "keep_if: .*no column 'luck'"),
         ({"licence": ""}, "licence"),
+        ({"compress": ["waymo"]}, "compress has waymo, which is not in formats"),
+        ({"compress": ["pyg"]}, "compress"),
+        ({"splits": {"study": ["*"]}}, "study is a folder of every dataset"),
+        ({"formats": ["huggingface"], "shard": 1001}, "at most 1000 runs fit in memory"),
+        (
+            {"formats": ["huggingface"], "splits": {"hold-out": ["t_*"], "hold_out": ["*"]}},
+            "cannot tell names apart",
+        ),
         ({"study": {"sample": [SAMPLE], "run": {"trajectories": False}}}, "trajectories"),
     ],
 )

@@ -9,7 +9,7 @@ from lxml import etree
 from odscen.base.errors import InputError
 from odscen.experiments.annotations import code_quality, github_annotations
 from odscen.experiments.baseline import fingerprint
-from odscen.experiments.datasets import DatasetPlan
+from odscen.experiments.dataset_plan import DatasetPlan
 from odscen.experiments.gates import (
     Update,
     _with_fields,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from odscen.base.errors import ScenarioError
-from odscen.experiments.datasets import DatasetPlan
+from odscen.experiments.dataset_plan import DatasetPlan
 from odscen.experiments.plan import StudyPlan
 from odscen.experiments.searches import SearchSettings, search
 from odscen.experiments.studies import begin_study, carry_out_study

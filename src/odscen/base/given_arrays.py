@@ -26,10 +26,11 @@ _MOST_CHARACTER = 0x10FFFF
 _SURROGATES = (0xD800, 0xDFFF)
 
 
-def npz_bytes(arrays: Mapping[str, Array]) -> bytes:
+def npz_bytes(arrays: Mapping[str, Array], *, deflated: bool = False) -> bytes:
     """Write arrays as an .npz file without pickles; the same arrays give the same bytes."""
     buffer = io.BytesIO()
-    np.savez(buffer, allow_pickle=False, **arrays)
+    write = np.savez_compressed if deflated else np.savez
+    write(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
 
 

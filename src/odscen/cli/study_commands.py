@@ -294,7 +294,8 @@ def dataset(
     The same command after an interruption runs what is missing. Runs that failed or that the
     plan leaves out are counted in the card. Exit code 0: the dataset is complete; 2: bad input.
     """
-    from odscen.experiments.datasets import CARD_FILE, make_dataset, read_dataset_plan
+    from odscen.experiments.dataset_plan import read_dataset_plan
+    from odscen.experiments.datasets import CARD_FILE, make_dataset
     from odscen.maps.store import Workspace
 
     place = Workspace.open(workspace)

@@ -294,10 +294,9 @@ class _StoppableReporter(Reporter):
 def _export_run(
     formats: tuple[str, ...], workspace: Workspace, result: Run
 ) -> dict[str, dict[str, bytes]]:
-    from odscen.app.exchange.exports import contents_of, run_contents
+    from odscen.app.exchange.dataset_exports import dataset_contents
 
-    found = run_contents(workspace, result.folder, {form: {} for form in formats})
-    return {form: contents_of(files) for form, files in found.items()}
+    return dataset_contents(workspace, result.folder, formats)
 
 
 def packed(folder: Path) -> bytes:

@@ -90,7 +90,7 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
         )
     states = _complete_states(source, recorded, rows)
     times = states["time"].unique().sort().to_numpy()
-    lanes = elements_of(source, source.roads).lanes
+    lanes = elements_of(source.of_map, source.sumo_map, source.roads).lanes
     signals = lane_signals(movements_of(source, lanes), lanes, recorded.states, times)
     here = set(states["id"].unique().to_list())
     users = [user for user in recorded.users if user.id in here]

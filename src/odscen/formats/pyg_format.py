@@ -7,10 +7,12 @@ Names, units and types are in ``docs/learning-formats.md``;
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.base.checksums import digest
 from odscen.formats.arrays_format import write_scenario_arrays
 from odscen.formats.base import WINDOW_OPTIONS, Format
+from odscen.maps.folder_names import plain_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,14 +20,22 @@ if TYPE_CHECKING:
     import numpy as np
 
     from odscen.base.arrays import FloatArray
-    from odscen.formats.base import ExportFiles, ExportSource
+    from odscen.formats.base import ExportFiles, ExportSource, Kept
     from odscen.formats.recordings.run_recording import MapElements, RunRecording
     from odscen.lanegraph.graphs import MapGraph
+    from odscen.opendrive.road_model import OpenDrive
+    from odscen.sumo.realize.sumo_map import SumoMap
 
     Arrays = dict[str, np.ndarray[Any, np.dtype[Any]]]
 
 ABOUT_FORMAT = "odscen-arrays"
 ABOUT_VERSION = 1
+LIGHT_VERSION = 2
+"""Of a file that names its map in place of having it."""
+SHARED_FORMAT = "odscen-map-arrays"
+MAPS_FOLDER = "maps"
+STATE_STEPS = 16384
+"""States of such a file are whole multiples of one over this: 0.06 mm, which deflates well."""
 
 
 def write_run_arrays(source: ExportSource) -> ExportFiles:
@@ -40,21 +50,83 @@ def write_run_arrays(source: ExportSource) -> ExportFiles:
     from odscen.formats.recordings.record import recording_of
 
     recording = recording_of(source)
+    of_map = source.of_map.made(
+        "pyg", lambda: _map_arrays(source.sumo_map.graph, recording.elements)
+    )
     arrays = {
-        **_describe_recording(recording),
-        **source.of_map.made("pyg", lambda: _map_arrays(source, recording.elements)),
+        **_describe_recording(recording, ABOUT_VERSION),
+        **of_map,
         **_track_arrays(recording),
         "agent_node": _first_nodes(recording, source),
     }
     return {f"{recording.name}.npz": npz_bytes(arrays)}
 
 
-def _describe_recording(recording: RunRecording) -> Arrays:
+class SharedMap(NamedTuple):
+    """Arrays of a map that several runs share; ``file`` is relative to the folder of the runs."""
+
+    file: str
+    content: bytes
+    sha256: str
+
+
+def shared_map(name: str, of_map: Kept, sumo_map: SumoMap, roads: OpenDrive) -> SharedMap:
+    """File with the arrays of a map, made once; the same map gives the same bytes.
+
+    Parameters
+    ----------
+    name
+        Of the map; with the beginning of its SHA-256 it names the file.
+    """
+
+    def make() -> SharedMap:
+        import numpy as np
+
+        from odscen.base.given_arrays import npz_bytes
+
+        sha256 = sumo_map.graph.map_sha256
+        about = {"format": SHARED_FORMAT, "version": 1, "map": name, "map_sha256": sha256}
+        arrays = _map_arrays(sumo_map.graph, elements_of(of_map, sumo_map, roads))
+        arrays["map_about"] = np.array(json.dumps(about, ensure_ascii=False))
+        content = npz_bytes(arrays, deflated=True)
+        plain = plain_name(name) or "map"
+        return SharedMap(f"{MAPS_FOLDER}/{plain}-{sha256[:12]}.npz", content, digest(content))
+
+    from odscen.formats.recordings.record import elements_of
+
+    return of_map.made(("shared map", name), make)
+
+
+def write_light_run_arrays(source: ExportSource) -> ExportFiles:
+    """One .npz file as of :func:`write_run_arrays` that names its map in place of having it.
+
+    It is deflated, and states are whole multiples of ``1 / STATE_STEPS``. Errors are those of
+    :func:`write_run_arrays`.
+    """
+    import numpy as np
+
+    from odscen.base.given_arrays import npz_bytes
+    from odscen.formats.recordings.record import recording_of
+
+    recording = recording_of(source)
+    assert source.roads is not None  # there is no recording without
+    shared = shared_map(recording.map_name, source.of_map, source.sumo_map, source.roads)
+    named = {"map_file": shared.file, "map_file_sha256": shared.sha256}
+    arrays = {
+        **_describe_recording(recording, LIGHT_VERSION, **named),
+        **_track_arrays(recording),
+        "agent_node": _first_nodes(recording, source),
+    }
+    arrays["agent_state"] = np.round(arrays["agent_state"] * STATE_STEPS) / STATE_STEPS
+    return {f"{recording.name}.npz": npz_bytes(arrays, deflated=True)}
+
+
+def _describe_recording(recording: RunRecording, version: int, **more: str) -> Arrays:
     import numpy as np
 
     about = {
         "format": ABOUT_FORMAT,
-        "version": ABOUT_VERSION,
+        "version": version,
         "run": recording.name,
         "scenario": recording.scenario,
         "map": recording.map_name,
@@ -62,12 +134,13 @@ def _describe_recording(recording: RunRecording) -> Arrays:
         "seed": recording.seed,
         "recorded_step": recording.recorded_step,
         "interpolated": recording.interpolated,
+        **more,
     }
     return {"about": np.array(json.dumps(about, ensure_ascii=False)), "time": recording.times}
 
 
-def _map_arrays(source: ExportSource, elements: MapElements) -> Arrays:
-    return {**_graph_arrays(source.sumo_map.graph), **_element_arrays(elements)}
+def _map_arrays(graph: MapGraph, elements: MapElements) -> Arrays:
+    return {**_graph_arrays(graph), **_element_arrays(elements)}
 
 
 def _graph_arrays(graph: MapGraph) -> Arrays:

@@ -6,7 +6,6 @@ https://download.pytorch.org/whl/cpu`` before it takes the build without CUDA, a
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from odscen.base.given_arrays import MOST_UNPACKED, arrays_from_npz
 from odscen.base.given_files import as_path, read_given
 from odscen.lanegraph.graphs import Relation, WalkKind
 from odscen.learning.scenario_hetero_data import scenario_arrays_of, scenario_hetero_data
+from odscen.learning.shared_maps import LIGHT_VERSION, about_of, named_map, read_shared_map
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -24,19 +24,20 @@ if TYPE_CHECKING:
     from odscen.base.given_arrays import Array
     from odscen.base.given_files import GivenPath
 
-_KNOWN = {"odscen-arrays": 1, "odscen-scenario-arrays": 1}
+_KNOWN = (("odscen-arrays", 1), ("odscen-arrays", LIGHT_VERSION), ("odscen-scenario-arrays", 1))
 """Formats of arrays, of a run and of a scenario, and their versions."""
 
 
 def read_arrays(path: GivenPath) -> dict[str, Array]:
     """Read the arrays of a run or of a scenario, as ``odscen export`` wrote them.
 
-    Nothing in the file is run; each array has the size that its header says.
+    Nothing in the file is run; each array has the size that its header says. The map of a run of a
+    dataset is read from the file in ``maps`` beside it.
 
     Parameters
     ----------
     path
-        An .npz file of ``--to pyg`` or ``--to arrays``.
+        An .npz file of ``--to pyg`` or ``--to arrays``, or of a dataset.
 
     Returns
     -------
@@ -47,26 +48,40 @@ def read_arrays(path: GivenPath) -> dict[str, Array]:
     ------
     InputError
         If the file cannot be read, is no such file or one of another version, or has a malformed
-        array; names it.
+        array, or its map is not there or another one; names it.
     """
-    arrays = arrays_from_npz(read_given(as_path(path), most=MOST_UNPACKED), file=str(path))
+    file = as_path(path)
+    arrays = own_arrays(read_given(file, most=MOST_UNPACKED), file=str(path))
+    named = named_map(arrays, file=str(path))
+    if named is None:
+        return arrays
+    return read_shared_map(file.parent, named, run=str(path)) | arrays
+
+
+def own_arrays(content: bytes, *, file: str) -> dict[str, Array]:
+    """Arrays of the content of a file, without a map that it names.
+
+    Raises
+    ------
+    InputError
+        If it is no such file, or of another version; names ``file``.
+    """
+    arrays = arrays_from_npz(content, file=file)
     known = _format_and_version(arrays)
     if known is None:
-        raise InputError("these are no arrays of a run or a scenario", file=str(path))
-    if _KNOWN.get(known[0]) != known[1]:
-        offered = " and ".join(f"{name} {version}" for name, version in _KNOWN.items())
-        raise InputError(
-            f"it is {known[0]} {known[1]}; this odscen reads {offered}", file=str(path)
-        )
+        raise InputError("these are no arrays of a run or a scenario", file=file)
+    if known not in _KNOWN:
+        offered = ", ".join(f"{name} {version}" for name, version in _KNOWN)
+        raise InputError(f"it is {known[0]} {known[1]}; this odscen reads {offered}", file=file)
     return arrays
 
 
 def _format_and_version(arrays: Mapping[str, Array]) -> tuple[str, int] | None:
     """Format and version that arrays say they are of."""
+    about = about_of(arrays) or {}
     try:
-        about = json.loads(str(arrays["about"]))
         return str(about["format"]), int(about["version"])
-    except (ValueError, KeyError, TypeError, RecursionError):
+    except (ValueError, KeyError, TypeError, OverflowError):
         return None
 
 

@@ -136,18 +136,20 @@ def export_run(
     WorkspaceError
         If the folder cannot be written.
     """
-    return _write_files(run_contents(workspace, run, {to: options or {}})[to], as_path(out))
+    wanted = {to: options or {}}
+    _refuse_unable(wanted)
+    return _write_files(run_contents(run_source(workspace, run), wanted)[to], as_path(out))
 
 
 def run_contents(
-    workspace: Workspace, run: GivenPath, wanted: Mapping[str, Mapping[str, str]]
+    source: ExportSource, wanted: Mapping[str, Mapping[str, str]]
 ) -> dict[str, ExportFiles]:
-    """Make the files of a run in several formats; it is read once for all of them.
+    """Make the files of a run in several formats; errors as of :func:`export_run`.
 
     Parameters
     ----------
-    run
-        As of :func:`export_run`, with the same errors.
+    source
+        As of :func:`run_source`.
     wanted
         Options by format.
 
@@ -156,15 +158,19 @@ def run_contents(
     dict
         By format and name, see :data:`~odscen.formats.base.ExportFiles`.
     """
-    writers = {to: _run_writer(to, options) for to, options in wanted.items()}
-    source = _run_source(workspace, run)
+    writers = _refuse_unable(wanted)
     found = {}
     for to, (chosen, write) in writers.items():
-        own = replace(source, options=dict(wanted[to]))
-        if chosen.needs_roads:
-            own = replace(own, roads=source.of_map.made("roads", lambda: _read_roads(source)))
-        found[to] = write(own)
+        roads = read_roads(source.of_map, source.map_file) if chosen.needs_roads else None
+        found[to] = write(replace(source, options=dict(wanted[to]), roads=roads))
     return found
+
+
+def _refuse_unable(
+    wanted: Mapping[str, Mapping[str, str]],
+) -> dict[str, tuple[Format, Callable[[ExportSource], ExportFiles]]]:
+    """Formats with what writes runs in them; one that cannot, or has no such option, is refused."""
+    return {to: _run_writer(to, options) for to, options in wanted.items()}
 
 
 def _run_writer(
@@ -182,7 +188,8 @@ def _run_writer(
     return chosen, chosen.write
 
 
-def _run_source(workspace: Workspace, run: GivenPath) -> ExportSource:
+def run_source(workspace: Workspace, run: GivenPath) -> ExportSource:
+    """A run to be written, read once for all formats; errors as of :func:`export_run`."""
     from odscen.app.running.reports import replay_page
     from odscen.app.scenarios import read_scenario
     from odscen.runs.finished_run import Run
@@ -197,14 +204,15 @@ def _run_source(workspace: Workspace, run: GivenPath) -> ExportSource:
     return replace(source, report=lambda: replay_page(workspace, folder, recorded))
 
 
-def _read_roads(source: ExportSource) -> OpenDrive:
+def read_roads(of_map: Kept, file: Path) -> OpenDrive:
+    """Road model of a map, read once."""
     from odscen.opendrive.parse import parse
 
-    return parse(source.map_file.read_bytes(), file=source.map_file.name)
+    return of_map.made("roads", lambda: parse(file.read_bytes(), file=file.name))
 
 
 @lru_cache(maxsize=2)
-def _kept_of(entry: MapEntry) -> Kept:
+def kept_of(entry: MapEntry) -> Kept:
     """What formats have made of a map; that of the last two stays in memory."""
     from odscen.formats.base import Kept
 
@@ -348,7 +356,7 @@ def _make_source(
         assets=workspace.assets(),
         options=dict(options or {}),
         recorded=recorded,
-        of_map=_kept_of(loaded.entry),
+        of_map=kept_of(loaded.entry),
     )
 
 

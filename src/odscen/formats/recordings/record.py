@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from odscen.base.arrays import FloatArray
-    from odscen.formats.base import ExportSource, RecordedRun
+    from odscen.formats.base import ExportSource, Kept, RecordedRun
     from odscen.formats.recordings.run_recording import LaneElement, MapElements
     from odscen.opendrive.road_model import OpenDrive
     from odscen.sumo.realize.sumo_map import SumoMap
@@ -155,10 +155,9 @@ def recording_of(source: ExportSource) -> RunRecording:
     return source.of_run.made(window, lambda: _make_recording(source, recorded, roads, window))
 
 
-def elements_of(source: ExportSource, roads: OpenDrive) -> MapElements:
+def elements_of(of_map: Kept, sumo_map: SumoMap, roads: OpenDrive) -> MapElements:
     """Elements of the map, made once for all exports on it."""
-    graph = source.sumo_map.graph.lanes
-    return source.of_map.made("elements", lambda: map_elements(roads, graph))
+    return of_map.made("elements", lambda: map_elements(roads, sumo_map.graph.lanes))
 
 
 def movements_of(source: ExportSource, lanes: Sequence[LaneElement]) -> list[Movement]:
@@ -170,7 +169,7 @@ def _make_recording(
     source: ExportSource, recorded: RecordedRun, roads: OpenDrive, window: ExportWindow
 ) -> RunRecording:
     times = instants(recorded, window)
-    elements = elements_of(source, roads)
+    elements = elements_of(source.of_map, source.sumo_map, roads)
     movements = movements_of(source, elements.lanes)
     return RunRecording(
         name=source.name,
