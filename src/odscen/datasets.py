@@ -4,7 +4,7 @@
 >>> datasets.make_dataset(workspace, "dataset.toml", "out", processes=2)
 >>> runs = datasets.open_dataset("out", split="train")
 >>> arrays = runs[0]  # read when it is asked for, with the map of its shard
->>> for batch in datasets.batches(runs, 8, agents=128):  # one shape, for JAX or torch
+>>> for batch in datasets.batches(runs, 8, **runs.sizes):  # one shape, for JAX or torch
 ...     print(batch["agent_state"].shape)
 """
 

@@ -111,6 +111,8 @@ def test_numbers_of_a_recording_are_those_of_its_states(workspace: Workspace, ru
     table = run.trajectories()
     speeds = table["speed"].cast(float)
     of_all = said["categories"].values()
+    assert said["most"]["agents"] == table["id"].n_unique()
+    assert said["most"]["steps"] == table["time"].n_unique()
     assert sum(one["tracks"] for one in of_all) == table["id"].n_unique()
     assert sum(sum(one["speeds"]) for one in of_all) == table.height
     assert sum(one["speeds"][0] for one in of_all) == (speeds < 0.1).sum()

@@ -73,7 +73,8 @@ class MadeUpExports:
                     "metres": 45.0,
                     "speeds": [30, *9 * [0], 60],
                 }
-                said = {"seconds": 10.0, "lights": seed, "categories": {"car": numbers}}
+                most = {"agents": seed, "lights": seed, "steps": 9 - seed, "lanes": 24}
+                said = {"seconds": 10.0, "most": most, "categories": {"car": numbers}}
                 exports[STATISTICS] = {STATISTICS_FILE: json.dumps(said).encode()}
                 yield [Outcome(run.name, row, None, exports)]
 

@@ -130,8 +130,10 @@ def test_a_dataset_is_read_one_run_at_a_time(made_once: Path, form: str) -> None
     said = [json.loads(str(arrays["about"]))["run"] for arrays in runs]
     assert said == RUNS
     assert runs[2]["lane_point"].shape[1] == 9
+    assert runs.sizes == {"agents": 2, "lights": 2, "steps": 9, "lanes": 24}
     light = open_dataset(made_once, split="test", form=form, with_map=False, transform=len)
     assert list(light) == [5, 5]
+    assert light.sizes == {"agents": 2, "lights": 2, "steps": 8}
 
 
 def _cut_tar(dataset: Path) -> None:

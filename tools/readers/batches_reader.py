@@ -15,8 +15,6 @@ import torch
 
 from odscen.learning.run_datasets import batches, open_dataset, padded_batch
 
-SIZES = {"agents": 256, "lights": 256, "steps": 400, "lanes": 2048}
-
 
 def main(folder, out):
     facts = json.loads((Path(folder) / "dataset.json").read_text())
@@ -30,6 +28,8 @@ def main(folder, out):
 
     driven, by_torch = 0.0, 0.0
     splits = [one["split"] for one in facts["splits"] if one["runs"]]
+    of_splits = [open_dataset(folder, split=split).sizes for split in splits]
+    sizes = {name: max(one[name] for one in of_splits) for name in of_splits[0]}
     for split in splits:
         runs = open_dataset(folder, split=split)
         names = [json.loads(str(one["about"]))["run"] for one in runs]
@@ -37,12 +37,12 @@ def main(folder, out):
             runs,
             batch_size=2,
             num_workers=2,
-            collate_fn=functools.partial(padded_batch, **SIZES),
+            collate_fn=functools.partial(padded_batch, **sizes),
             multiprocessing_context="spawn",  # JAX has threads, which a fork would lose
         )
         number = 0
         ids = [one["agent_id"].tolist() for one in runs]
-        for batch, other in zip(batches(runs, 2, **SIZES), loader, strict=True):
+        for batch, other in zip(batches(runs, 2, **sizes), loader, strict=True):
             tensors = torch.utils.data.default_convert(other)
             assert all(np.array_equal(batch[key], one.numpy()) for key, one in tensors.items())
             state, valid = tensors["agent_state"], tensors["agent_valid"]

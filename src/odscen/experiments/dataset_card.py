@@ -39,8 +39,8 @@ class MapFacts:
         How many are in the dataset.
     seconds
         Of all recordings.
-    lights
-        Lanes with a light, of the run with the most.
+    most
+        Sizes of the arrays of the run with the most: ``agents``, ``lights``, ``steps``, ``lanes``.
     categories
         See :func:`~odscen.formats.recordings.track_statistics.track_statistics`.
     picture
@@ -52,7 +52,7 @@ class MapFacts:
     split: str
     runs: int = 0
     seconds: float = 0.0
-    lights: int = 0
+    most: Mapping[str, int] = field(default_factory=dict)
     categories: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     picture: str | None = None
 
@@ -64,18 +64,19 @@ class MapFacts:
             "split": self.split,
             "runs": self.runs,
             "seconds": self.seconds,
-            "lights": self.lights,
+            "most": dict(self.most),
             "picture": self.picture,
             "road_users": {name: dict(one) for name, one in self.categories.items()},
         }
 
 
 def summed(rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """Statistics of several recordings together; of lights the most that one has."""
-    seconds, lights = 0.0, 0
+    """Statistics of several recordings together; of sizes the most that one has."""
+    seconds, most = 0.0, dict[str, int]()
     categories: dict[str, dict[str, Any]] = {}
     for row in rows:
-        seconds, lights = seconds + row["seconds"], max(lights, row["lights"])
+        seconds += row["seconds"]
+        most |= {name: max(size, most.get(name, 0)) for name, size in row["most"].items()}
         for name, one in row["categories"].items():
             whole = categories.setdefault(
                 name, {"tracks": 0, "seconds": 0.0, "metres": 0.0, "speeds": []}
@@ -86,7 +87,7 @@ def summed(rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     order = [str(category) for category in Category]
     return {
         "seconds": round(seconds, 1),
-        "lights": lights,
+        "most": most,
         "categories": {name: categories[name] for name in order if name in categories},
     }
 
@@ -231,8 +232,7 @@ def _road_users(facts: DatasetFacts) -> str:
     for split in facts.plan.splits:
         own = [one for one in facts.maps if one.split == split]
         whole = summed(
-            {"seconds": one.seconds, "lights": one.lights, "categories": one.categories}
-            for one in own
+            {"seconds": one.seconds, "most": one.most, "categories": one.categories} for one in own
         )
         rows += [
             [split, name, *_describe_tracks([one])] for name, one in whole["categories"].items()
@@ -278,7 +278,7 @@ def _describe_maps(facts: DatasetFacts) -> str:
     heads = ["map", "split", "runs", "seconds", "lanes with a light", *_OF_TRACKS]
     rows = [
         [
-            *(one.name, one.split, one.runs, f"{one.seconds:,.0f}", one.lights),
+            *(one.name, one.split, one.runs, f"{one.seconds:,.0f}", one.most.get("lights", 0)),
             *_describe_tracks(list(one.categories.values())),
             one.sha256,
         ]

@@ -234,7 +234,7 @@ def _read_maps(file: Path) -> tuple[MapFacts, ...]:
                 one["split"],
                 one.get("runs", 0),
                 one.get("seconds", 0.0),
-                one.get("lights", 0),
+                one.get("most", {}),
                 one.get("road_users", {}),
                 one.get("picture"),
             )

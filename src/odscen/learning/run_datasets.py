@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import tarfile
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -65,6 +65,9 @@ class RunDataset:
         Called with the arrays of each run, such as :func:`~odscen.datasets.hetero_data`.
     with_map
         Whether items have the arrays of their map.
+    sizes
+        ``agents``, ``lights`` and ``steps`` of the run of the split with the most, and ``lanes`` of
+        the largest map: what :func:`batches` needs for batches of one shape.
     """
 
     folder: Path
@@ -72,6 +75,7 @@ class RunDataset:
     form: str
     transform: Callable[[dict[str, Array]], Any] | None = None
     with_map: bool = True
+    sizes: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._places = list(_find_runs(self.folder / self.split / self.form, self.form))
@@ -139,7 +143,7 @@ def open_dataset(
         If no dataset is there, it has no such split or format, or runs are missing.
     """
     folder = as_path(folder)
-    formats, splits = _read_facts(folder)
+    formats, splits, sizes = _read_facts(folder, split)
     if split not in splits:
         raise InputError(f"it has no split {split!r}: {', '.join(splits)}", file=str(folder))
     able = [one for one in formats if one in (PYG, WEBDATASET)]
@@ -151,7 +155,9 @@ def open_dataset(
             else f"{form} is not read here, but by its own readers; pyg and webdataset are",
             file=str(folder),
         )
-    found = RunDataset(folder, split, chosen, transform, with_map)
+    if not with_map:
+        sizes.pop("lanes", None)
+    found = RunDataset(folder, split, chosen, transform, with_map, sizes)
     if len(found) != splits[split]:
         raise InputError(
             f"split {split} has {splits[split]} runs by {FACTS_FILE}, its shards have {len(found)}",
@@ -160,17 +166,22 @@ def open_dataset(
     return found
 
 
-def _read_facts(folder: Path) -> tuple[list[str], dict[str, int]]:
-    """Formats of a dataset, and runs of each of its splits."""
+def _read_facts(folder: Path, split: str) -> tuple[list[str], dict[str, int], dict[str, int]]:
+    """Formats of a dataset, runs of each of its splits, and sizes of one."""
     file = folder / FACTS_FILE
     if not file.is_file():
         raise InputError(f"no complete dataset is here: it has no {FACTS_FILE}", file=str(folder))
     try:
         said = json.loads(read_given(file))
         formats = [str(form) for form in said["plan"]["formats"]]
-        return formats, {str(row["split"]): int(row["runs"]) for row in said["splits"]}
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        runs = {str(row["split"]): int(row["runs"]) for row in said["splits"]}
+        sizes: dict[str, int] = {}
+        for row in said["maps"]:
+            for name, size in row.get("most", {}).items() if row["split"] == split else ():
+                sizes[str(name)] = max(int(size), sizes.get(str(name), 0))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError("it does not say what the dataset has", file=str(file)) from error
+    return formats, runs, sizes
 
 
 def _find_runs(folder: Path, form: str) -> Iterator[_Place]:
@@ -367,7 +378,7 @@ def batches(
         Leaves out a last batch that is smaller.
     agents, lights, steps, lanes, lane_points
         Of :func:`padded_batch`, whose errors it has: give them where all batches are to have one
-        shape, as a function that JAX has compiled wants it.
+        shape, as a function that JAX has compiled wants it; ``**runs.sizes`` fits all of a split.
 
     Yields
     ------

@@ -19,10 +19,11 @@ _CLASSES: Final = 121
 
 
 def track_statistics(recording: RunRecording) -> dict[str, Any]:
-    """JSON-ready: seconds of the recording, lanes with a light, and by category of road users.
+    """JSON-ready: seconds of the recording, sizes of its arrays, and by category of road users.
 
-    Of each category: ``tracks``, ``seconds`` that they were there, ``metres`` that they moved, and
-    ``speeds``, how many states are of each class of speeds.
+    ``most`` has the sizes: ``agents``, ``lights`` (lanes with one), ``steps`` (instants) and
+    ``lanes`` of the map. Of each category: ``tracks``, ``seconds`` that they were there, ``metres``
+    that they moved, and ``speeds``, how many states are of each class of speeds.
     """
     tracks = recording.tracks
     speed = np.abs(tracks.speed)
@@ -40,4 +41,10 @@ def track_statistics(recording: RunRecording) -> dict[str, Any]:
             "speeds": np.trim_zeros(counts, "b").tolist(),
         }
     seconds = round(float(recording.times[-1] - recording.times[0]), 6)
-    return {"seconds": seconds, "lights": len(recording.signals.lane), "categories": found}
+    most = {
+        "agents": len(tracks.ids),
+        "lights": len(recording.signals.lane),
+        "steps": len(recording.times),
+        "lanes": len(recording.elements.lanes),
+    }
+    return {"seconds": seconds, "most": most, "categories": found}
