@@ -15,9 +15,10 @@ from odscen.base.ids import LaneKey, RoadId
 from odscen.maps.map_edits import MendedMap, check_edits, mend_map, read_edits
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
+from odscen.opendrive import parse as parse_module
 from odscen.opendrive.lanes import RoadTable
 from odscen.opendrive.objects import crosswalks, is_crosswalk, is_stop_line, stop_lines
-from odscen.opendrive.parse import parse
+from odscen.opendrive.parse import ReadRoads, parse
 from odscen.opendrive.topology import lane_successors
 
 if TYPE_CHECKING:
@@ -281,3 +282,24 @@ def test_a_newer_file_has_the_edits_of_a_map_under_another_name_and_the_map_stay
     with pytest.raises(InputError):
         workspace.renew_map("town", b"no map", file="newer.xodr")
     assert workspace.map("town").read("xodr") == before
+
+
+def test_of_a_mended_map_only_the_roads_that_are_new_are_read_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    known, read = ReadRoads(), []
+    edit = {"kind": "lane_width", "at": place("1", -1, 60.0), "width": 4.0}
+    xodr = mend_map(CROSSING, check_edits([edit]), known=known).xodr
+    once = parse_module.parse_road
+    monkeypatch.setattr(
+        parse_module,
+        "parse_road",
+        lambda element, notes: read.append(element.get("id")) or once(element, notes),
+    )
+    again = parse(xodr, known=known)
+    assert read == ["1"]
+    assert again == parse(xodr)
+    # What is skipped is counted as often.
+    content = CROSSING.replace(b"</planView>", b"</planView><surface/>")
+    assert parse(content, known=known).notes == parse(content, known=known).notes
+    assert parse(content, known=known).notes == parse(content).notes

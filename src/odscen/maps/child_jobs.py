@@ -17,6 +17,7 @@ from odscen.maps.importers.base import ImportSettings
 from odscen.maps.importers.registry import import_map
 from odscen.maps.map_build import build_map
 from odscen.maps.map_entry import XODR_FILE
+from odscen.opendrive.parse import ReadRoads
 
 Progress = Callable[[str, float], None]
 
@@ -42,7 +43,8 @@ def _build_map_job(
     xodr = place / XODR_FILE
     content = xodr.read_bytes()
     wish = ImportSettings(importer, options, edits)
-    opendrive, imported = import_map(content, file, wish, progress=progress)
+    known = ReadRoads()
+    opendrive, imported = import_map(content, file, wish, progress=progress, known=known)
     if imported is not None:
         xodr.rename(place / imported.original)
         xodr.write_bytes(opendrive)
@@ -58,6 +60,7 @@ def _build_map_job(
             imported=imported,
             most_lanes=MOST_LANES * times_usual,
             progress=progress,
+            known=known,
         )
     except OpenDriveError as error:
         if imported is not None:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from odscen.convert.verify.fidelity_result import Fidelity
     from odscen.maps.converters import GivenNetwork
     from odscen.maps.importers.base import ImportRecord
+    from odscen.opendrive.parse import ReadRoads
 
 
 FORMAT = "odscen-map"
@@ -60,6 +61,7 @@ def build_map(
     imported: ImportRecord | None,
     most_lanes: float,
     progress: Callable[[str, float], None],
+    known: ReadRoads | None = None,
 ) -> None:
     """Fill ``folder`` with all of :data:`FILES`.
 
@@ -79,6 +81,8 @@ def build_map(
         Metres that all drivable lanes, or all walks, may have together.
     progress
         Called with what comes next and the share done.
+    known
+        Roads of the file that have been read already.
 
     Raises
     ------
@@ -92,7 +96,7 @@ def build_map(
     start = time.perf_counter()
     progress("reading the map", 0.0)
     content = (folder / FILES["xodr"]).read_bytes()
-    odr = parse(content, file=file)
+    odr = parse(content, file=file, known=known)
     table = RoadTable.of(odr)
     progress("building the lane graph", 0.1)
     graph = build_map_graph(

@@ -24,6 +24,8 @@ from odscen.opendrive.write import rewrite_opendrive
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from odscen.opendrive.parse import ReadRoads
+
 FORMAT = "odscen-map-edits"
 
 Metres = Annotated[float, Field(gt=0.0, le=200.0)]
@@ -410,18 +412,25 @@ def edits_text(edits: Sequence[MapEdit]) -> str:
     return json.dumps({"format": FORMAT, "edits": rows}, indent=1) + "\n"
 
 
-def mend_map(xodr: bytes, edits: Sequence[MapEdit], *, file: str = "") -> MendedMap:
+def mend_map(
+    xodr: bytes, edits: Sequence[MapEdit], *, file: str = "", known: ReadRoads | None = None
+) -> MendedMap:
     """Apply edits to OpenDRIVE, one after the other.
 
     Roads, junctions and controllers that no edit touches stay as they are in the file, but for
     comments; those touched are written anew.
+
+    Parameters
+    ----------
+    known
+        Keeps the roads that are read, for who reads the mended map next.
 
     Raises
     ------
     OpenDriveError
         If the map cannot be read.
     """
-    before = parse(xodr, file=file)
+    before = parse(xodr, file=file, known=known)
     bench = EditedMap(before)
     rows, kept = [], []
     for number, edit in enumerate(edits, 1):

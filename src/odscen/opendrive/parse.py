@@ -13,6 +13,8 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from lxml.etree import tostring
+
 from odscen.base.errors import OpenDriveError, in_file
 from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_checks import check_numbers, find_faults
@@ -23,7 +25,7 @@ from odscen.opendrive.parse_lengths import fit_lengths
 from odscen.opendrive.parse_references import check_references
 from odscen.opendrive.parse_repairs import free_roads_of_no_junction, repair_junction_tables
 from odscen.opendrive.parse_road import parse_road
-from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule
+from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule, SkippedElements
 from odscen.opendrive.parse_xml import (
     CONTROLS,
     Element,
@@ -53,7 +55,27 @@ K = TypeVar("K")
 V = TypeVar("V")
 
 
-def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
+class ReadRoads:
+    """Roads that have been read, by their text: a file that is mended has most of them again."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, tuple[Road, SkippedElements]] = {}
+
+    def read(self, element: Element, notes: Notes) -> Road:
+        """Road of an element; one for which tolerances were used is always read anew."""
+        text = tostring(element, with_tail=False)
+        known = self._known.get(text)
+        if known is not None:
+            road, skipped = known
+            notes.skip_all(skipped)
+            return road
+        road, skipped, alone = notes.skipped_by(lambda: _parse_road_once_repeated(element, notes))
+        if alone:
+            self._known[text] = road, skipped
+        return road
+
+
+def parse(text: str | bytes, *, file: str = "", known: ReadRoads | None = None) -> OpenDrive:
     """Road model of an OpenDRIVE file.
 
     Parameters
@@ -62,6 +84,8 @@ def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
         The whole file; bytes are decoded as the XML declaration says.
     file
         Name of the file for error messages.
+    known
+        Roads that have been read before; those that are read now are kept there, too.
 
     Returns
     -------
@@ -77,7 +101,7 @@ def parse(text: str | bytes, *, file: str = "") -> OpenDrive:
     with in_file(file) if file else nullcontext():
         notes = Notes()
         root = read_tree(text, notes)
-        return _parse_root(root, notes)
+        return _parse_root(root, notes, known)
 
 
 def read_tree(text: str | bytes, notes: Notes) -> Element:
@@ -153,7 +177,7 @@ def _space_controls(root: Element, notes: Notes) -> None:
                 notes.add(Rule.CONTROL_CHARACTER, element, detail)
 
 
-def _parse_root(root: Element, notes: Notes) -> OpenDrive:
+def _parse_root(root: Element, notes: Notes, known: ReadRoads | None) -> OpenDrive:
     if root.tag != "OpenDRIVE":
         raise refusal(root, f"the root element is <{shown_id(str(root.tag))}>, not <OpenDRIVE>")
     groups = children(root)
@@ -165,11 +189,12 @@ def _parse_root(root: Element, notes: Notes) -> OpenDrive:
     elements = groups.get("road", [])
     if not elements:
         raise refusal(root, "there is no <road>")
+    read = _parse_road_once_repeated if known is None else known.read
     roads: dict[RoadId, Road] = {}
     faults: list[RoadFault] = []
     for element in elements:
         try:
-            road = _parse_road_once_repeated(element, notes)
+            road = read(element, notes)
         except OpenDriveError as error:
             faults.append(RoadFault(element.get("id", ""), error))
         else:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from enum import StrEnum
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias, TypeVar
 
 from odscen.opendrive.parse_xml import Element, element_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 class Rule(StrEnum):
@@ -191,7 +194,10 @@ MAX_NEGATIVE_WIDTH: Final = 0.25
 _LISTED_PER_RULE = 1000
 
 
-NotesMark: TypeAlias = tuple[int, Counter[Rule], Counter[tuple[Rule, str, str]]]
+SkippedElements: TypeAlias = Counter[tuple[Rule, str, str]]
+"""Numbers of elements that are not read, by rule, parent and tag."""
+NotesMark: TypeAlias = tuple[int, Counter[Rule], SkippedElements]
+Read = TypeVar("Read")
 
 
 class Notes:
@@ -200,7 +206,7 @@ class Notes:
     def __init__(self) -> None:
         self._sentences: list[str] = []
         self._uses: Counter[Rule] = Counter()
-        self._skipped: Counter[tuple[Rule, str, str]] = Counter()
+        self._skipped: SkippedElements = Counter()
 
     def add(self, rule: Rule, place: Element | str, detail: str) -> None:
         """Note that ``rule`` was used at ``place``."""
@@ -212,6 +218,21 @@ class Notes:
     def skip(self, rule: Rule, parent: str, tag: str, count: int = 1) -> None:
         """Count elements ``tag`` below ``parent`` that are not read; one note per kind."""
         self._skipped[rule, parent[:60], tag[:60]] += count
+
+    def skip_all(self, skipped: SkippedElements) -> None:
+        """Count elements that are not read, as they were counted before."""
+        self._skipped.update(skipped)
+
+    def skipped_by(self, read: Callable[[], Read]) -> tuple[Read, SkippedElements, bool]:
+        """What reads something gives, what it skips, and whether it notes nothing else."""
+        before, self._skipped = self._skipped, Counter()
+        uses = self._uses.copy()
+        try:
+            value = read()
+        finally:
+            own, self._skipped = self._skipped, before
+            before.update(own)
+        return value, own, uses == self._uses
 
     def mark(self) -> NotesMark:
         """Where the notes stand, for :meth:`return_to`."""

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
     from odscen.maps.importers.base import ImportSettings
+    from odscen.opendrive.parse import ReadRoads
 
 GROUP = "odscen.map_importers"
 """Group of entry points."""
@@ -127,8 +128,14 @@ def import_map(
     settings: ImportSettings,
     *,
     progress: Callable[[str, float], None],
+    known: ReadRoads | None = None,
 ) -> tuple[bytes, ImportRecord | None]:
     """Make OpenDRIVE of a file.
+
+    Parameters
+    ----------
+    known
+        Keeps the roads that are read where a map is mended.
 
     Returns
     -------
@@ -169,7 +176,7 @@ def import_map(
         from odscen.maps.map_edits import mend_map, read_edits
 
         progress("mending the map", 0.05)
-        mended = mend_map(xodr, read_edits(settings.edits), file=file)
+        mended = mend_map(xodr, read_edits(settings.edits), file=file, known=known)
         xodr = mended.xodr
         record = record._replace(entries=(*entries, *mended.entries), edits=mended.edits)
     return xodr, record
