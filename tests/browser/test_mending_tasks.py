@@ -222,3 +222,30 @@ def test_junctions_are_joined_and_what_does_not_fit_is_said_before_anything_is_b
     hand.press(side.get_by_role("button", name="Undo", exact=True))
     expect(changes(user)).to_have_count(0)
     assert len(mended(served, f"{name}-mended").junctions) == len(model.junctions)
+
+
+@pytest.mark.slow
+def test_a_lane_is_widened_and_limited_by_keyboard(user: OdscenPage, served: Served) -> None:
+    name = "crossing-widened"
+    workspace = Workspace.open(served.workspace)
+    workspace.add_map_content(CROSSING, file="crossing.xodr", name=name)
+    user.page.goto(f"/#/mend/{name}")
+    expect(user.map.area).to_be_visible()
+    hand, side = Keys(user), bench(user)
+    hand.choose(spot("2", -2, 70.0))
+    for number, (field, typed, button) in enumerate(
+        (("Lane width, m", "4", "Change width"), ("Speed limit, km/h", "30", "Change limit")), 1
+    ):
+        user.map.area.focus()
+        user.tab_to(side.get_by_label(field), back=True)
+        user.page.keyboard.press("Control+a")
+        user.page.keyboard.type(typed)
+        hand.press(side.get_by_role("button", name=button))
+        expect(changes(user)).to_have_count(number)
+        expect(side.get_by_text("The map is being built anew")).to_have_count(0)
+    assert user.actions()["pointer"] == 0
+    model = mended(served, f"{name}-mended")
+    table = RoadTable.of(model)
+    row = np.array([table.lane_index[k] for k in table.lane_keys if (k.road, k.lane) == ("2", -2)])
+    assert table.lane_width(row, np.array([70.0]))[0] == pytest.approx(4.0)
+    assert model.roads[RoadId("2")].sections[0].lanes[-2].speeds[0].max == pytest.approx(30 / 3.6)
