@@ -11,6 +11,7 @@ from odscen.drawing.map_drawing import Area, Lines, MapDrawing
 from odscen.figures.measures.summary import actor_outcomes
 from odscen.records.run_events import Event, EventKind
 from odscen.records.run_plan import Plan, PlannedActor
+from odscen.reports.place_names import PlaceNames
 from odscen.reports.report_words import duration
 from odscen.reports.run_report import render_report
 
@@ -189,3 +190,12 @@ def test_long_tables_are_cut_and_say_so():
 )
 def test_durations_are_written_for_people(seconds, text):
     assert duration(seconds) == text
+
+
+def test_rules_are_told_with_units_and_where_they_acted_by_streets() -> None:
+    values = {"all[0].ttc": 3.0, "all[1].speed": 12.5, "all[2].time": 4.0}
+    events = (Event(4.0, EventKind.RULE_STARTED, "a", 100.0, 118.0, rule="cut-in", values=values),)
+    names = PlaceNames({"j1": "East Street / North Street"}, middles={"j1": np.zeros(2)})
+    page = report(events=events, names=names)
+    assert "cut-in (time to collision 3 s, speed 12.5 m/s)" in page
+    assert "at 150 m north-east of East Street / North Street (x 100 m, y 118 m)" in page

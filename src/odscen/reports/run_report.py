@@ -62,6 +62,7 @@ from odscen.reports.report_sections import (
 )
 from odscen.reports.report_signals import signal_values
 from odscen.reports.report_words import duration, moment, starting_at
+from odscen.scenario.story.condition_kinds import CONDITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -227,7 +228,7 @@ def render_report(
             emissions=emission_values(figures, names) if figures else None,
             criteria=asked,
             expectations=summary.get("expectations") or (),
-            events=_event_values(events, actors, problems=summary.get("problems") or ()),
+            events=_event_values(events, actors, names, problems=summary.get("problems") or ()),
             actors=_actor_values(actors, travel(traces)),
             foot=_foot_values(summary),
         )
@@ -671,11 +672,37 @@ class _EventRow(NamedTuple):
     reason: str
 
 
+_VALUE_WORDS = {
+    "ttc": "time to collision", "headway": "time headway", "distance": "distance",
+    "reaches": "distance", "travelled": "travelled", "speed": "speed",
+    "relative_speed": "relative speed", "acceleration": "acceleration", "stopped": "stopped for",
+}  # fmt: skip
+"""What a rule was about when it started, by the kind of its condition."""
+_SAID_BY_TIME = frozenset({"time", "signal", "appeared", "touched", "off_road"})
+"""Kinds of which the number says no more than that they hold."""
+
+
+def _name_rule_value(name: str, value: float) -> str:
+    """``"time to collision 3 s"`` for the value of ``all[1].ttc``; empty if it says nothing."""
+    kind = name.rsplit(".", maxsplit=1)[-1]
+    if kind in _SAID_BY_TIME:
+        return ""
+    known = CONDITIONS.get(kind)
+    unit = known.unit if known else ""
+    return f"{_VALUE_WORDS.get(kind, kind)} {value:.4g} {unit}".rstrip()
+
+
 def _event_values(
-    events: Sequence[Event], actors: Sequence[ActorOutcome], *, problems: Sequence[str] = ()
+    events: Sequence[Event],
+    actors: Sequence[ActorOutcome],
+    names: PlaceNames,
+    *,
+    problems: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Everything unusual, in order of time, in words; ``problems`` are known before the start."""
-    listed = [(event.time, _event_row(event)) for event in events if event.kind in EVENT_WORDS]
+    listed = [
+        (event.time, _event_row(event, names)) for event in events if event.kind in EVENT_WORDS
+    ]
     listed += [
         (actor.depart, _EventRow(number(actor.depart, 1), actor.id, *_NOT_INSERTED))
         for actor in actors
@@ -690,15 +717,18 @@ def _event_values(
     }
 
 
-def _event_row(event: Event) -> _EventRow:
+def _event_row(event: Event, names: PlaceNames) -> _EventRow:
     words, reason = EVENT_WORDS[event.kind]
     if event.rule:
-        values = ", ".join(f"{name} {value:.4g}" for name, value in (event.values or {}).items())
+        said = [_name_rule_value(name, value) for name, value in (event.values or {}).items()]
+        values = ", ".join(filter(None, said))
         words += f": {event.rule}" + (f" ({values})" if values else "")
     if event.partner:
         words += f" with {event.partner}"
     if event.x is not None and event.y is not None:
-        words += f" at x {number(event.x, 1)} m, y {number(event.y, 1)} m"
+        spot = f"x {number(event.x, 1)} m, y {number(event.y, 1)} m"
+        where = f"{names.describe_spot(event.x, event.y)} ({spot})" if names.middles else spot
+        words += f" at {where}"
     if event.kind is EventKind.COLLISION and event.values:
         words += f", {number(event.values.get('impact_speed', 0.0), 1)} m/s faster"
     if event.detail:
