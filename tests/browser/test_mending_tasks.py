@@ -232,10 +232,10 @@ def test_a_lane_is_widened_and_limited_by_keyboard(user: OdscenPage, served: Ser
     user.page.goto(f"/#/mend/{name}")
     expect(user.map.area).to_be_visible()
     hand, side = Keys(user), bench(user)
-    hand.choose(spot("2", -2, 70.0))
     for number, (field, typed, button) in enumerate(
         (("Lane width, m", "4", "Change width"), ("Speed limit, km/h", "30", "Change limit")), 1
     ):
+        hand.choose(spot("2", -2, 70.0))
         user.map.area.focus()
         user.tab_to(side.get_by_label(field), back=True)
         user.page.keyboard.press("Control+a")

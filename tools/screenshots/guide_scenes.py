@@ -32,7 +32,7 @@ def expert(studio: Studio) -> None:
         with user.changing():
             user.undo.click()
         user.step("Rules").click()
-        camera.look_at(CROSSING, closer=2)
+        camera.look_at(CROSSING, closer=4)
         camera.take("guide-rules")
         run_of_head(user).click()
         user.wait_until_moving()
