@@ -33,7 +33,7 @@ regression: $(READY)
 	$(BIN)/odscen test suites/netconvert.toml --jobs 2 --workspace build/regression --junit build/regression/junit-netconvert.xml --html build/regression/report-netconvert.html
 
 # Exports of runs read by programs of others, in environments of their own in build/interchange
-# (3 GB); see docs/learning-formats.md. `make test` reads the same with plain readers.
+# (5 GB); see docs/learning-formats.md. `make test` reads the same with plain readers.
 test-interchange: $(READY)
 	$(BIN)/python -m tools.read_exports $(INTERCHANGE)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import pickle
+import shutil
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from odscen.app.exchange.dataset_exports import ARRAYS, STATISTICS, STATISTICS_FILE, dataset_map
+from odscen.app.generation import generate
 from odscen.base.errors import ConflictError, InputError, ScenarioError
 from odscen.base.given_arrays import npz_bytes
 from odscen.experiments.dataset_plan import DatasetPlan, read_dataset_plan
@@ -20,7 +22,8 @@ from odscen.experiments.work import LocalExecutor, Outcome
 from odscen.formats.recordings.tfrecord import tfrecord
 from odscen.formats.scenarionet_format import pickled
 from odscen.scenario.document.problems import validated
-from tests.experiments.study_case import place
+from odscen.scenario.sampling.generation_settings import GenerationSettings
+from tests.experiments.study_case import WARM, place
 from tests.sumo.story_case import entry
 
 if TYPE_CHECKING:
@@ -209,6 +212,30 @@ def test_the_card_has_maps_splits_versions_and_what_was_left_out(tmp_path: Path)
     for one in said["files"]:
         content = (tmp_path / one["path"]).read_bytes()
         assert (len(content), hashlib.sha256(content).hexdigest()) == (one["bytes"], one["sha256"])
+
+
+def test_an_export_that_was_deleted_in_between_is_said(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        made(tmp_path, plan(), MadeUpExports(most=2))
+    gone = min((tmp_path / "staged" / ARRAYS).iterdir())
+    shutil.rmtree(gone)
+    with pytest.raises(InputError, match=f"what run {gone.name} was exported to is not there"):
+        made(tmp_path, plan(), MadeUpExports())
+
+
+def test_runs_that_would_have_one_name_are_refused(tmp_path: Path) -> None:
+    made_here = tmp_path / "scenarios"
+    for name in ("cut", "cut-in"):
+        settings = GenerationSettings(map_name="signal_crossing", seed=1)
+        (file,) = generate(place(), settings=settings, out=made_here / name)
+        file.rename(made_here / f"{name}.scenario.json")
+    edits = WARM["edits"]
+    variants = [{"name": name, "edits": edits} for name in ("in-rain", "rain")]
+    study = {"scenarios": [f"scenarios/{name}.scenario.json" for name in ("cut", "cut-in")]}
+    asked = plan(study={**study, "variant": variants, "run": {"until": 10.0}})
+    with pytest.raises(InputError, match="would both be 'cut-in-rain-seed-1'"):
+        made(tmp_path, asked, MadeUpExports())
+    assert not (tmp_path / "plan.json").exists()
 
 
 def test_another_plan_in_the_same_folder_is_refused(tmp_path: Path) -> None:

@@ -84,8 +84,20 @@ class ShardSource:
         """Files that a run was exported to, as they were written.
 
         Hidden ones are none of them: what a process that was killed had begun to write.
+
+        Raises
+        ------
+        DamagedError
+            If they are not as they were written.
+        InputError
+            If there are none.
         """
         folder = self.staged / _export_of(form) / run
+        if not folder.is_dir():
+            raise InputError(
+                f"what run {run} was exported to is not there; make the dataset in another folder",
+                file=str(folder),
+            )
         check_files(folder)
         return sorted(
             path for path in folder.iterdir() if path.name != SUMS_FILE and path.name[0] != "."

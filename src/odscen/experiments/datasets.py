@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.app.exchange.dataset_exports import STATISTICS, STATISTICS_FILE
 from odscen.base.checksums import SUMS_FILE, check_files, digest, file_digest, write_sums
-from odscen.base.errors import ConflictError
+from odscen.base.errors import ConflictError, InputError
 from odscen.base.folder_locks import locked
 from odscen.base.given_files import as_path, is_path
 from odscen.base.stored_files import documents
@@ -102,7 +102,9 @@ def make_dataset(
         # Before anything is written: a plan that is refused leaves the folder to another one.
         sources = found_sources(plan.study, workspace, beside=beside)
         plan.refuse_without_split(dict.fromkeys(source.map_name for source in sources.values()))
-        refuse_taken_names(grid_of(plan.study, sources).parameters)
+        asked = grid_of(plan.study, sources)
+        refuse_taken_names(asked.parameters)
+        _refuse_equal_folders(asked)
         _begin_dataset(out, plan)
         study = out / STUDY_FOLDER
         grid = begin_study_of(workspace, plan.study, study, beside=beside)
@@ -115,6 +117,18 @@ def make_dataset(
         )
         table, left_out = _choose_runs(plan, ended.table)
         return _finish_dataset(out, workspace, plan, grid, table, left_out)
+
+
+def _refuse_equal_folders(grid: StudyGrid) -> None:
+    """Raise :class:`InputError` if two runs would have one name in the dataset."""
+    known: dict[str, str] = {}
+    for run in grid.runs():
+        other = known.setdefault(folder_name(run.name), run.name)
+        if other != run.name:
+            raise InputError(
+                f"runs {other} and {run.name} would both be {folder_name(run.name)!r} in the "
+                "dataset; name a scenario or a variant otherwise"
+            )
 
 
 def _begin_dataset(out: Path, plan: DatasetPlan) -> None:
@@ -244,6 +258,7 @@ def _read_maps(file: Path) -> tuple[MapFacts, ...]:
 
 def _draw_maps(out: Path, workspace: Workspace, maps: tuple[MapFacts, ...]) -> tuple[MapFacts, ...]:
     """Draw the first map of each split that has runs."""
+    shutil.rmtree(out / PICTURES_FOLDER, ignore_errors=True)  # what a kill has left of them
     drawn: set[str] = set()
     found = []
     for one in maps:
