@@ -228,9 +228,18 @@ class _WalkNetBuilder:
         )
 
     def _lay_chains(self, chains: Sequence[Chain]) -> None:
-        """Make an edge of each chain, of three parts if both ends are at one junction."""
+        """Make an edge of each chain, of three parts if both ends are at one junction.
+
+        Of two parts where something else leads from the one end to the other already: SUMO knows
+        one way from edge to edge, and a person who goes on from the one to the other at this end
+        would be at that end at once.
+        """
         alignments: list[LaneAlignment] = []
         ends: list[tuple[NodeKey, NodeKey]] = []
+        joined = {
+            frozenset(id(self._walking_area_at(self._ends[number, which])) for which in (0, 1))
+            for number in range(len(self._crosswalks))
+        }
         for chain in chains:
             spans = [
                 (arc.start, arc.end) if along else (arc.end, arc.start) for arc, along in chain
@@ -252,7 +261,12 @@ class _WalkNetBuilder:
                 keys = [(kind, len(alignments)), (kind, len(alignments) + 1)]
                 alignments += thirds(alignment)
                 ends += [(first, keys[0]), (keys[0], keys[1]), (keys[1], last)]
+            elif (both := frozenset((id(one), id(other)))) in joined:
+                key = (_RING, len(alignments))
+                alignments += divided(alignment, sum(s.extent for s in alignment) / 2.0)
+                ends += [(first, key), (key, last)]
             else:
+                joined.add(both)
                 alignments.append(alignment)
                 ends.append((first, last))
         meetings = Counter(key for pair in ends for key in pair)
