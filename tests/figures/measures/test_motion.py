@@ -176,6 +176,23 @@ def test_turning_on_the_spot_and_driving_backwards_are_found():
     assert ("car-1", "yaw rate") not in pairs
 
 
+@pytest.mark.parametrize(("radius", "cause"), [(3.0, "tight path"), (12.0, "junction")])
+def test_a_lane_that_bends_more_than_the_wheels_steer_is_said(radius, cause):
+    plan = planned("car")
+    angle = np.linspace(0.0, np.pi / 2.0, 91)
+    bend = np.column_stack([radius * np.sin(angle), radius * (1.0 - np.cos(angle))])
+    lanes = RoadLanes(
+        edges={":J_0": ":J"}, inside=frozenset({":J_0"}), names=(":J_0",), lines=(bend,),
+        widths=(3.5,),
+    )  # fmt: skip
+    time = np.arange(41) * 0.1
+    spin = {"time": time, "x": np.zeros(41), "y": 0.0, "hdg": 3.0 * time, "speed": 0.0,
+            "lane": ":J_0"}  # fmt: skip
+    found = check_motion(table(plan, spin), plan, lanes=lanes)
+    assert ("yaw rate", cause) in kinds(found)
+    assert len(motion.implausible(found)) == len(found)  # its cause is known, not excused
+
+
 def test_bodies_that_overlap_and_bodies_off_the_road_are_found_with_their_partner():
     plan = planned("car", "bus", "car")
     found = check_motion(

@@ -15,13 +15,14 @@ as that of emergencies, Fambro et al., "Determination of Stopping Sight Distance
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.base.bends import largest_curvature
 from odscen.base.categories import Category
 from odscen.base.stored_files import tables
 from odscen.figures.measures.figure import COUNT, Basis, Better, ReportSection, RunFigure
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.figures.measures.figure import RunData
     from odscen.records.run_events import Event
-    from odscen.records.run_plan import Plan
+    from odscen.records.run_plan import Plan, PlannedActor
 
 MOTION_TABLE = "motion.csv"
 """Name of the table of findings in the folder of figures."""
@@ -81,13 +82,17 @@ KIND_UNITS: dict[MotionKind, str] = {
 
 
 class MotionCause(StrEnum):
-    """What a finding comes from; rules, teleports and collisions move by force."""
+    """What a finding comes from; rules, teleports and collisions move by force.
+
+    A path is tight where a lane of the map bends more than the wheels of the body steer.
+    """
 
     RULE = "rule"
     TELEPORT = "teleport"
     COLLISION = "collision"
     EMERGENCY_STOP = "emergency stop"
     LANE_CHANGE = "lane change"
+    TIGHT_PATH = "tight path"
     JUNCTION = "junction"
     LANE = "lane"
 
@@ -150,6 +155,8 @@ TOUCHING = 0.1
 """Metres by which bodies have to overlap."""
 SAMPLED = 1.0
 """Seconds between the records at which overlaps and lanes are looked at, at least."""
+_BEND = 2.0
+"""Metres over which a bend of a lane is measured."""
 _SHORT = 8.0
 """Metres of the diagonal of a body; longer ones are few."""
 _EPISODE = 1.0
@@ -194,6 +201,16 @@ class RoadLanes:
     names: Sequence[str]
     lines: Sequence[FloatArray]
     widths: Sequence[float]
+    _curvatures: dict[str, float] = field(default_factory=dict)
+
+    def curvature_of(self, name: str) -> float:
+        """Largest curvature of a lane, 1/m; 0 of one that is not known."""
+        if not self._curvatures:
+            self._curvatures.update(
+                (lane, largest_curvature(line, _BEND))
+                for lane, line in zip(self.names, self.lines, strict=True)
+            )
+        return self._curvatures.get(name, 0.0)
 
 
 class _Step(NamedTuple):
@@ -617,12 +634,24 @@ def _join_findings(
                     "bound": float(bounds[worst]),
                     "cause": str(
                         _find_cause((actor.id, other), begin, last, forced)
-                        or _cause_by_lane(lane_names, row, int(at[start]), int(at[end - 1]), lanes)
+                        or _cause_by_lane(
+                            lane_names,
+                            row,
+                            int(at[start]),
+                            int(at[end - 1]),
+                            lanes,
+                            _least_radius(actor) if kind is MotionKind.YAW_RATE else 0.0,
+                        )
                     ),
                     "partner": other,
                 }
             )
     return pl.DataFrame(found, schema=_empty_findings().schema)
+
+
+def _least_radius(actor: PlannedActor) -> float:
+    """Metres of the tightest path on which the front of a body can be steered; 0: any."""
+    return _bounds_row(BOUNDS.get(str(actor.category), _WALKS))[-1] * actor.length
 
 
 def _find_cause(
@@ -648,8 +677,9 @@ def _cause_by_lane(
     start: int,
     end: int,
     lanes: RoadLanes | None,
+    radius: float,
 ) -> MotionCause:
-    """A change of lanes within a few records, a junction, or the lane itself."""
+    """A change of lanes within a few records, a path too tight, a junction, or the lane itself."""
     if names is None or lanes is None:
         return MotionCause.LANE
     near = slice(max(0, start - 3), end + 4)
@@ -659,6 +689,8 @@ def _cause_by_lane(
             edge = lanes.edges.get(before)
             if edge is not None and edge == lanes.edges.get(after):
                 return MotionCause.LANE_CHANGE
+    if radius > 0.0 and any(lanes.curvature_of(name) * radius > 1.0 for name in around if name):
+        return MotionCause.TIGHT_PATH
     if any(name in lanes.inside for name in around if name):
         return MotionCause.JUNCTION
     return MotionCause.LANE
