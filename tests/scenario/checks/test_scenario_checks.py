@@ -150,6 +150,17 @@ def test_a_node_carries_one_actor_or_one_flow() -> None:
     assert codes(actor(), flows=(flow,)) == ["node_taken"]
 
 
+def test_flows_follow_one_another_on_a_node() -> None:
+    steps = [
+        Flow(id=f"f{n}", spawn="1.0.-1.10", per_hour=100 * n, begin=60.0 * n, end=60.0 * (n + 1))
+        for n in (1, 2, 3)
+    ]
+    assert codes(flows=tuple(steps)) == []
+    longer = steps[0].model_copy(update={"end": 121.0})
+    assert codes(flows=(steps[1], longer)) == ["node_taken"]
+    assert codes(actor(depart=9), flows=tuple(steps)) == ["node_taken"]
+
+
 def test_ids_are_given_once_and_the_ego_is_one_vehicle() -> None:
     twice = codes(actor(), actor("1.0.-1.20"))
     assert twice == ["duplicate_id"]

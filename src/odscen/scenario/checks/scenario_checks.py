@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from itertools import pairwise
 from math import floor
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,6 +19,7 @@ from odscen.scenario.checks.measure_checks import measure_problems
 from odscen.scenario.checks.rule_checks import rule_problems
 from odscen.scenario.checks.signal_checks import signal_problems
 from odscen.scenario.document.problems import MOST_OF_KIND, Problem, error, limited, warning
+from odscen.scenario.document.scenario_document import Flow
 from odscen.scenario.placing.bodies import Box, Crowd, body_of, box_at
 from odscen.scenario.placing.region import Region, place_of
 
@@ -273,16 +275,29 @@ def roi_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
 
 
 def shared_nodes(scenario: Scenario) -> Iterator[Problem]:
-    """Yield nodes that more than one actor or flow starts on (R37, R44)."""
-    users: dict[str, list[tuple[str, str]]] = defaultdict(list)
+    """Yield nodes that more than one actor or flow starts on (R37, R44).
+
+    Flows may follow one another on a node, as where an inflow grows by steps.
+    """
+    users: dict[str, list[tuple[str, Actor | Flow]]] = defaultdict(list)
     for kind in ("actors", "flows"):
         for index, one in enumerate(getattr(scenario, kind)):
-            users[one.spawn].append((f"{kind}[{index}].spawn", one.id))
+            users[one.spawn].append((f"{kind}[{index}].spawn", one))
     for node, sharing in users.items():
-        if len(sharing) > 1:
-            names = some_of([repr(name) for _, name in sharing])
+        if len(sharing) > 1 and not _follow_each_other([one for _, one in sharing]):
+            names = some_of([repr(one.id) for _, one in sharing])
             message = f"{names} start on the same node {node!r}; move all but one"
             yield error("node_taken", sharing[-1][0], message, nodes=[node])
+
+
+def _follow_each_other(users: Sequence[Actor | Flow]) -> bool:
+    """Whether all are flows of which each ends before the next begins."""
+    flows = sorted(
+        (one for one in users if isinstance(one, Flow)), key=lambda flow: (flow.begin, flow.end)
+    )
+    return len(flows) == len(users) and all(
+        before.end <= after.begin for before, after in pairwise(flows)
+    )
 
 
 def duplicate_ids(scenario: Scenario) -> Iterator[Problem]:
