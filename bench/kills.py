@@ -140,7 +140,7 @@ def morning(workspace: Workspace, name: str, hours: float, trips: float) -> Path
     part = curve(scenario.demand, matrix.profile).amount(hours * 3600.0) / DAY
     rows = tuple((origin, goal, number * part) for origin, goal, number in matrix.trips)
     demand = scenario.demand.model_copy(
-        update={"matrices": (matrix.model_copy(update={"trips": rows}),)}
+        update={"matrices": (matrix.model_copy(update={"trips": rows, "end": hours * 3600.0}),)}
     )
     simulation = scenario.simulation.model_copy(update={"duration": hours * 3600.0})
     scenario = scenario.model_copy(update={"demand": demand, "simulation": simulation})

@@ -3,6 +3,8 @@
 A motorway of two lanes at 120 km/h with cars that come at random, seen at 2 km: flow, speed,
 density, headways and changes of lanes. The shipped suite's crossings with lights: deceleration of
 those who stop, and room in queues. A right angle of 10 m radius: speed and what is felt of it.
+Three lanes of which one ends, with more and more cars: flow before and after the breakdown, and how
+fast the queue's waves go upstream.
 """
 
 from __future__ import annotations
@@ -48,6 +50,7 @@ def main() -> None:
         print_motorway(store, folder)
         print_lights(store, folder)
         print_curve(store, folder)
+        print_breakdown(store, folder)
 
 
 def own_map(
@@ -190,6 +193,113 @@ def print_curve(store: Workspace, folder: Path) -> None:
         f"right angle of 10 m: {len(speed)} cars, 15, 50, 85 %: "
         + ", ".join(f"{3.6 * rate:.1f} km/h ({rate**2 / 11.875:.1f} m/s2)" for rate in rates)
     )
+
+
+DROP_AT = 2500.0
+RISING = (1200.0, 1400.0, 1500.0, 1600.0, 1700.0, 1800.0)
+"""Vehicles per hour and lane of three, ten minutes each; two lanes carry 1,600 at most."""
+QUEUED = 70.0 / 3.6
+"""m/s of the mean upstream below which there is a queue (HCM takes 3/4 of the free speed)."""
+
+
+def print_breakdown(store: Workspace, folder: Path) -> None:
+    """Flow per lane behind the end of a lane, in five minutes before a queue, and in the queue."""
+    file = folder / "drop.xodr"
+    file.write_text(drop_map())
+    store.add_map(file)
+    entry = store.map("drop")
+    settings = GenerationSettings(map_name="drop", fill=0.0, roi_segments=200)
+    (path,) = generate(store, settings=settings)
+    until = 600.0 * (len(RISING) + 2)
+    flows = tuple(
+        Flow(
+            id=f"step{step}-{lane}", per_hour=rate, begin=600.0 * step, initial_speed=25.0,
+            end=600.0 * (step + 1) if step < len(RISING) - 1 else until,
+            spawn=entry.nearest(10.0, -1.875 - 3.75 * lane, 0.0).id,
+            goal=entry.nearest(3990.0, -1.875 - 3.75 * min(lane, 1), 0.0).id,
+        )
+        for step, rate in enumerate(RISING)
+        for lane in range(3)
+    )  # fmt: skip
+    scenario = read_scenario(path).model_copy(update={"actors": (), "flows": flows})
+    done = run(store, scenario, settings=RunSettings(until=until), out=folder / "drop")
+    rows = done.trajectories().sort("id", "time")
+    flow, speed = (
+        np.array([
+            value(rows, begin) for begin in np.arange(0.0, until - 300.0, 300.0)
+        ])
+        for value in (flow_behind, speed_before)
+    )  # fmt: skip
+    queued = np.flatnonzero(speed < QUEUED)
+    if not len(queued):
+        print("\nthree lanes of which one ends: no queue")
+        return
+    before, after = flow[: queued[0]].max(), flow[queued[0] + 1 :].mean()
+    waves = wave_speed(rows, until)
+    print(
+        f"\nthree lanes of which one ends: {before:.0f} veh/h/lane before the queue, {after:.0f} "
+        f"out of it ({100.0 * (1.0 - after / before):.0f} % less); waves {waves:.0f} km/h upstream"
+    )
+
+
+def drop_map() -> str:
+    """A road of 4 km whose third lane ends at :data:`DROP_AT`."""
+
+    def lanes(count: int, link: str) -> str:
+        parts = (
+            LANE.format(-number).replace(
+                "><width",
+                f'><link><{link} id="{-number}"/></link><width' if number < 3 else "><width",
+            )
+            for number in range(1, count + 1)
+        )
+        return f'<center><lane id="0" type="none"/></center><right>{"".join(parts)}</right>'
+
+    return (
+        '<OpenDRIVE><header revMajor="1" revMinor="6"/><road id="1" length="4000" junction="-1">'
+        '<link/><type s="0" type="motorway"><speed max="120" unit="km/h"/></type><planView>'
+        '<geometry s="0" x="0" y="0" hdg="0" length="4000"><line/></geometry></planView><lanes>'
+        f'<laneSection s="0">{lanes(3, "successor")}</laneSection>'
+        f'<laneSection s="{DROP_AT}">{lanes(2, "predecessor")}</laneSection>'
+        "</lanes></road></OpenDRIVE>"
+    )
+
+
+def flow_behind(rows: pl.DataFrame, begin: float) -> float:
+    """Vehicles per hour and lane at 700 m behind the end, in five minutes."""
+    here = DROP_AT + 700.0
+    part = rows.filter(pl.col("time").is_between(begin, begin + 300.0))
+    x, same = pl.col("x"), pl.col("id") == pl.col("id").shift(1)
+    return 12.0 * len(part.filter((x >= here) & (x.shift(1) < here) & same)) / 2.0
+
+
+def speed_before(rows: pl.DataFrame, begin: float) -> float:
+    """m/s in the 500 m before the end, mean over five minutes."""
+    part = rows.filter(
+        pl.col("time").is_between(begin, begin + 300.0)
+        & pl.col("x").is_between(DROP_AT - 500.0, DROP_AT)
+    )
+    return float(part["speed"].mean() or math.inf)
+
+
+def wave_speed(rows: pl.DataFrame, until: float) -> float:
+    """km/h at which a slowdown goes upstream in the last half hour, by the shift of speeds.
+
+    The mean speeds around two places 500 m apart, in bins of 5 s, are held against each other.
+    """
+    series = []
+    for place in (1200.0, 1700.0):
+        part = rows.filter(
+            (pl.col("time") > until - 1800.0) & pl.col("x").is_between(place - 50.0, place + 50.0)
+        )
+        bins = part.group_by((pl.col("time") // 5.0).alias("bin")).agg(pl.col("speed").mean())
+        known = bins.sort("bin")
+        at = np.arange((until - 1800.0) // 5.0 + 1, until // 5.0)
+        series.append(np.interp(at, known["bin"].to_numpy(), known["speed"].to_numpy()))
+    up, down = (one - one.mean() for one in series)
+    lags = np.arange(4, 60)
+    likeness = [float(np.corrcoef(up[lag:], down[:-lag])[0, 1]) for lag in lags]
+    return 3.6 * 500.0 / (5.0 * float(lags[int(np.argmax(likeness))]))
 
 
 if __name__ == "__main__":
