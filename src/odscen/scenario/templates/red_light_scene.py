@@ -36,6 +36,8 @@ _STARTING = 2.6
 """m/s2 with which SUMO's cars start."""
 _STEADY = 2.2
 """Seconds of constant speed of the ego before the paths cross."""
+_PASSING = 3.0
+"""Seconds after which the runner has left the place where the paths cross."""
 _LONGEST = 120.0
 """Metres from the runner's start to the stop line, at most."""
 
@@ -108,6 +110,9 @@ def _at_light(
                  {"all": [{"rule": {"id": "wait"}},
                           {"rule": {"id": "green", "has": "started"}}]},
                  {"arrive": arrive}, {"speed": {"to": round(fast, 4), "shape": "step"}}),
+            # A story that drives on would take the next bend at any speed.
+            rule("past", "runner", {"rule": {"id": "run", "has": "ended"}, "delay": _PASSING},
+                 {"release": {}}, {"drive": {"by": "sumo"}}),
         ),
         duration=180.0,
         wanted=(

@@ -141,6 +141,8 @@ class Stepper:
         if saved:
             session.turning_gaps.forget()
             session.lateral_places.forget()
+            session.curve_speeds.forget()
+            session.turn_exits.forget()
         self._busy += clock() - begin - waited
         self._finish_run(session, now, more=more)
         return now
@@ -166,7 +168,11 @@ class Stepper:
         else:
             moved = self._moved_by_others()
             session.turning_gaps.before_step(only=self._take_gaps, moved=moved)
-            session.lateral_places.before_step(only=self._take_gaps, moved=moved)
+            session.curve_speeds.before_step(only=self._take_gaps, moved=moved)
+            session.turn_exits.before_step(only=self._take_gaps, moved=moved)
+            session.lateral_places.before_step(
+                only=self._take_gaps, moved=moved, placed=self._placed_by_others()
+            )
         after = session.step()
         if self.behaviour is None:
             session.turning_gaps.after_step()
@@ -196,6 +202,12 @@ class Stepper:
         moved = frozenset() if self.story is None else self.story.moved
         placed = self._watch.placed if isinstance(self._watch, LockstepWatch) else None
         return moved if placed is None else moved | {placed}
+
+    def _placed_by_others(self) -> Collection[str]:
+        """Who is put somewhere by rules or by another program."""
+        placed = frozenset() if self.story is None else self.story.placed
+        other = self._watch.placed if isinstance(self._watch, LockstepWatch) else None
+        return placed if other is None else placed | {other}
 
     def _take_rules(self, session: Session) -> None:
         """Let rules act on the last step: at once, or when a program has given others."""

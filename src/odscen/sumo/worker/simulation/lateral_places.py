@@ -21,6 +21,8 @@ _LONGEST_WAIT = 2.0
 """Seconds after which a vehicle is looked at in any case: a rule may have made it faster."""
 _LONGEST_STEP = 0.5
 """Seconds of a step up to which this is done: beyond it is not foreseen who enters a lane."""
+_LARGEST_GAIN = 20.0
+"""m/s2 by which something else makes a vehicle faster, at most; more is seen a step late."""
 _LEAST = 1e-4
 """Metres that are no change."""
 
@@ -66,7 +68,11 @@ class LateralPlaces:
         self._lane_sizes: dict[str, tuple[float, float]] = {}
 
     def before_step(
-        self, *, only: frozenset[str] | None = None, moved: Collection[str] = ()
+        self,
+        *,
+        only: frozenset[str] | None = None,
+        moved: Collection[str] = (),
+        placed: Collection[str] = (),
     ) -> None:
         """Prepare those who may enter another lane in the step to come.
 
@@ -75,7 +81,9 @@ class LateralPlaces:
         only
             Whose places are kept; ``None``: everyone's.
         moved
-            Who is driven by something else.
+            Whose speed something else chooses: perhaps one that is not allowed.
+        placed
+            Of these, who is put somewhere, and left alone here.
         """
         if self._step < 0:
             simulation = self._sumo.simulation
@@ -95,7 +103,7 @@ class LateralPlaces:
         due = [name for name in names if only is None or name in only]
         for name in (*due, *self._due.pop(self._step, ())):
             with suppress(*self._errors):  # it has arrived
-                self._look_at(name, is_moved=name in moved)
+                self._look_at(name, is_moved=name in moved, is_placed=name in placed)
 
     def forget(self) -> None:
         """Put all where they are, before the state is saved; those in the middle are left alone."""
@@ -117,25 +125,30 @@ class LateralPlaces:
                     vehicle.setLateralLanePosition(name, self._beside(name) + aside)
         self._entries.clear()
 
-    def _look_at(self, name: str, *, is_moved: bool) -> None:
+    def _look_at(self, name: str, *, is_moved: bool, is_placed: bool) -> None:
         beside = float(self._beside(name))
         if beside == 0.0:
             return
         vehicle = self._sumo.vehicle
         lane = vehicle.getLaneID(name)
-        if is_moved or not lane:
+        if is_placed or not lane:
             self._plan_look(name, self._step_length)
             return
         width, gains = vehicle.getWidth(name), vehicle.getAccel(name)
         speed, seconds = vehicle.getSpeed(name), self._step_length
         rest = self._size_of(lane)[0] - vehicle.getLanePosition(name)
-        if (speed + gains * seconds) * seconds < rest:
+        if is_moved and (speed + _LARGEST_GAIN * seconds) * seconds < rest:
+            self._plan_look(name, seconds)
+            return
+        if not is_moved and (speed + gains * seconds) * seconds < rest:
             reaching = (math.sqrt(speed * speed + 2.0 * gains * rest) - speed) / gains
             self._plan_look(name, reaching)
             return
         likely = speed + vehicle.getAcceleration(name) * seconds
-        beyond = min(max(0.0, likely), vehicle.getAllowedSpeed(name)) * seconds - rest
-        farthest = (speed + gains * seconds) * seconds - rest
+        if not is_moved:
+            likely = min(likely, vehicle.getAllowedSpeed(name))
+        beyond = max(0.0, likely) * seconds - rest
+        farthest = max(beyond, (speed + gains * seconds) * seconds - rest, 0.0)
         entered = self._find_lane(name, lane, beyond if beyond >= 0.0 else 0.5 * farthest)
         given = beside if entered is None else self._scale_offset(beside, width, entered, lane)
         if beyond < 0.0 and abs(given) > abs(beside):

@@ -14,6 +14,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import SimulationError
+from odscen.sumo.worker.simulation.curve_speeds import CurveSpeeds
 from odscen.sumo.worker.simulation.driven_vehicles import DrivenVehicles
 from odscen.sumo.worker.simulation.foreign_traffic import ForeignLights, ForeignTraffic, is_foreign
 from odscen.sumo.worker.simulation.lateral_places import LateralPlaces
@@ -31,6 +32,7 @@ from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 from odscen.sumo.worker.simulation.stop_doors import StopDoors
 from odscen.sumo.worker.simulation.stopped_vehicles import StoppedVehicles
 from odscen.sumo.worker.simulation.switched_lights import SwitchedLights
+from odscen.sumo.worker.simulation.turn_exits import TurnExits
 from odscen.sumo.worker.simulation.turning_gaps import TurningGaps
 
 if TYPE_CHECKING:
@@ -150,6 +152,18 @@ class Session:
         """Where vehicles are beside the centres of their lanes."""
         native = partial(_native_function, self._sumo)
         return LateralPlaces(self._sumo, self._errors, self.lanes, native)
+
+    @cached_property
+    def curve_speeds(self) -> CurveSpeeds:
+        """How fast those who want more than the limit go through curves."""
+        native = partial(_native_function, self._sumo)
+        return CurveSpeeds(self._sumo, self._errors, self.lanes, native)
+
+    @cached_property
+    def turn_exits(self) -> TurnExits:
+        """Changes of lanes that wait until a vehicle has left its turn."""
+        native = partial(_native_function, self._sumo)
+        return TurnExits(self._sumo, self._errors, self.lanes, native)
 
     @cached_property
     def place(self) -> Placing:

@@ -137,6 +137,11 @@ class StoryRun:
         """Who is moved by rules now."""
         return frozenset(name for name, move in self._moves.items() if move != _FREE)
 
+    @property
+    def placed(self) -> frozenset[str]:
+        """Who is put somewhere by rules now, and does not only have its speed from them."""
+        return frozenset(name for name, move in self._moves.items() if move.pose is not None)
+
     def after_step(self, time: float, recorder: Recorder) -> None:
         """Look at the road as it is at ``time``, say what rules do, and act for the next step."""
         road, moved = self._road, self._moves
