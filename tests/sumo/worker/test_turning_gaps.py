@@ -164,3 +164,47 @@ def test_who_turns_is_looked_at_when_it_may_have_come_near(net: Path, tmp_path: 
     assert 0 < asked["getLastStepVehicleIDs"] <= 200
     changed = drive(net, tmp_path, {"a": STRAIGHT}, rerouted=LEFT)
     assert 0 < changed["getLastStepVehicleIDs"] <= 200
+
+
+def touching_turns(folder: Path, *, looks: bool, step: str) -> tuple[int, int]:
+    """Pairs that touch, and who arrives: left turns from both sides that pass beside each other."""
+    net, routes = folder / "town.net.xml", folder / "both.xml"
+    net.write_bytes(converted(named("carla-2020/Town07")).network.net_xml)
+    ways = {"a": ("44.0.f 55.0.f",), "b": ("45.0.b 44.0.b", "45.0.b 0.0.f")}
+    vehicles = [
+        (number * (5.0 if side == "a" else 4.3), f"{side}{number}", edges[number % len(edges)])
+        for side, edges in ways.items()
+        for number in range(40)
+    ]
+    routes.write_text(
+        "<routes>"
+        + CAR.replace("/>", ' impatience="0.4"/>')
+        + "".join(
+            f'<vehicle id="{name}" type="car" depart="{depart}" departSpeed="max"><route'
+            f' edges="{edges}"/></vehicle>'
+            for depart, name, edges in sorted(vehicles)
+        )
+        + "</routes>"
+    )
+    touched, arrived = set(), 0
+    with open_session(
+        ["-n", str(net), "-r", str(routes), "--step-length", step, "--no-step-log",
+         "--collision.action", "warn", "--collision.check-junctions",
+         "--collision.mingap-factor", "0"]
+    ) as session:  # fmt: skip
+        while session.time < 900.0 and session.expected():
+            if looks:
+                session.turning_gaps.before_step()
+            session.step()
+            if looks:
+                session.turning_gaps.after_step()
+            if (happened := session.happened()) is not None:
+                touched |= {frozenset((c.collider, c.victim)) for c in happened.collisions}
+                arrived += len(happened.arrived)
+    return len(touched), arrived
+
+
+@pytest.mark.parametrize("step", ["0.1", "0.5"])
+def test_turns_that_pass_beside_each_other_do_not_touch(step: str, tmp_path: Path) -> None:
+    assert touching_turns(tmp_path, looks=True, step=step) == (0, 80)
+    assert touching_turns(tmp_path, looks=False, step=step)[0] >= 3

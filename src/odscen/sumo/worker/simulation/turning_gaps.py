@@ -46,8 +46,16 @@ _SIGHT = 90.0
 """Metres before their stop line from which on those who come are looked at."""
 _OPPOSING = math.radians(120.0)
 """Angle between two approaches from which on one comes towards the other."""
+_BEND = math.radians(30.0)
+"""Angle from which on a path is a turn."""
 _LONGEST = 8.0
 """Metres of a vehicle whose body stays on its path; the sides of longer ones leave it in a turn."""
+_APART = 0.5
+"""Metres before it would touch another at which one who turns stops."""
+_FIRMLY, _HARDEST = 3.0, 7.0
+"""m/s2 with which it brakes for that, and at most."""
+_CREEPING = 0.3
+"""m/s below which one who turns waits."""
 _STANDING = 2.0
 """m/s below which it is not sure that one who is in the junction leaves it."""
 _WIDTH = 2.1
@@ -88,13 +96,30 @@ class _Crossing:
 
 
 @dataclass(frozen=True, eq=False)
+class _NearPath:
+    """A path that comes towards a turn, and so near that bodies touch, without crossing it.
+
+    SUMO sees no conflict there. ``here`` is the stretch, metres from the stop line of the turn, on
+    which a front touches what drives on the other path, and ``there`` that of the other one;
+    ``lanes`` are the lanes inside the junction of the other one, each with the metres that lie
+    before it; ``goes_first``: the other one has the lower number in the junction.
+    """
+
+    here: tuple[float, float]
+    there: tuple[float, float]
+    lanes: tuple[tuple[str, float], ...]
+    goes_first: bool
+
+
+@dataclass(frozen=True, eq=False)
 class _Turn:
     """A turn: the lane up to where one waits and its length, and who crosses behind that place.
 
     That is a place inside the junction, or else the stop line. ``speed`` is that of the lane behind
     it, m/s; ``light`` names the traffic light, empty without one, and ``index`` the link there.
     ``approaches`` are the lanes from which others come, each with the paths that it leads over, the
-    metres from its begin to the stop lines there, and whether it is inside the junction.
+    metres from its begin to the stop lines there, and whether it is inside the junction. ``inside``
+    are its own lanes there, with the metres before each, and ``near`` who passes beside it.
     """
 
     waiting: str
@@ -103,6 +128,8 @@ class _Turn:
     light: str
     index: int
     approaches: tuple[tuple[str, tuple[tuple[_Crossing, float, bool], ...]], ...]
+    inside: dict[str, float]
+    near: tuple[_NearPath, ...]
 
 
 class _Route(NamedTuple):
@@ -202,6 +229,8 @@ class TurningGaps:
                 self._forget_vehicle(name)
                 continue
             turn = lanes.get(lane)
+            if turn is not None and turn.near and lane in turn.inside and name not in moved:
+                self._keep_off(name, turn, turn.inside[lane])
             if turn is None or name in moved:
                 self._set_ignored(name, ())
                 if lane not in lanes:
@@ -381,6 +410,33 @@ class TurningGaps:
             free.append(other)
         return free
 
+    def _keep_off(self, name: str, turn: _Turn, before: float) -> None:
+        """Have one who turns stop before it touches another who turns beside it.
+
+        Parameters
+        ----------
+        before
+            Metres of its path before its lane.
+        """
+        front, speed = before + self._position_of(name), self._speed_of(name)
+        for near in turn.near:
+            room = near.here[0] - front
+            if room < speed * speed / (2.0 * _HARDEST):  # it is there, or cannot stop any more
+                continue
+            for lane, metres in near.lanes:
+                for other in self._on_lane(lane):
+                    theirs = metres + self._position_of(other)
+                    if theirs - self._body_of(other).length > near.there[1]:
+                        continue
+                    waits = theirs < near.there[0] and self._speed_of(other) < _CREEPING
+                    if theirs > near.there[0] or (near.goes_first and not waits):
+                        # As fast as it can still stop from after the step to come.
+                        rest, step = max(0.0, room - _APART), _FIRMLY * self._step_length
+                        slow = math.sqrt(step * step + 2.0 * _FIRMLY * rest) - step
+                        self._sumo.vehicle.setSpeed(name, min(slow, speed))
+                        self._held.append(name)
+                        return
+
     def _passed_on_way(self, name: str, turn: _Turn) -> Collection[str]:
         """Those whom one who turns need not wait for.
 
@@ -522,13 +578,17 @@ class TurningGaps:
                 inner = next((link[4] for link in links_of[via] if link[4]), "")
                 waiting, beyond = (via, inner) if inner else (source, via)
                 approaches = self._find_approaches(source, onto, beyond)
-                if approaches:
+                inside = {via: 0.0, inner: lane.getLength(via)} if inner else {via: 0.0}
+                near = self._find_near_paths(source, onto, [*inside])
+                if approaches or near:
                     turn = _Turn(
                         waiting,
                         lane.getLength(waiting),
                         lane.getMaxSpeed(beyond),
                         *self._find_lights.get(via, ("", 0)),
                         approaches,
+                        inside,
+                        near,
                     )
                     found |= {waiting: turn, beyond: turn}
         return {**dict.fromkeys(own), **found} if found else {}
@@ -560,6 +620,59 @@ class TurningGaps:
             for name, rest in self._list_upstream(other):
                 found[name].append((crossing, rest, False))
         return tuple((name, tuple(paths)) for name, paths in found.items())
+
+    def _find_near_paths(self, source: str, onto: str, own: Sequence[str]) -> tuple[_NearPath, ...]:
+        """Paths of those who turn towards a turn and pass beside it, nearer than bodies are wide.
+
+        Parameters
+        ----------
+        own
+            Lanes of the turn inside the junction.
+        """
+        lane = self._sumo.lane
+        entries = self._find_entries[self._junction_behind(source)]
+        number = entries.index((source, onto, own[0]))
+        path, found = self._join_shapes(own), []
+        for place, (other, other_onto, via) in enumerate(entries):
+            if len({source, onto, other, other_onto}) < 4 or lane.getEdgeID(other_onto) == (
+                lane.getEdgeID(onto)
+            ):
+                continue
+            ahead = lane.getShape(source)[-2:], lane.getShape(other)[-2:]
+            if _measure_turn(*ahead) < _OPPOSING:
+                continue
+            parts = [via, *(link[4] for link in self._lanes.links_of[via] if link[4])]
+            theirs = self._join_shapes(parts)
+            if not _turns_alike(path, theirs):
+                continue
+            (along, places), (their_along, their_places) = _place_on(path), _place_on(theirs)
+            apart = places[::2, None] - their_places[None, ::2]
+            if (
+                np.hypot(apart[..., 0], apart[..., 1]).min() > _WIDTH + _SPACING
+                or _find_meeting(path, theirs) is not None
+            ):
+                continue
+            touches = _find_touching_fronts(places, their_places)
+            touched = _find_touching_fronts(their_places, places)
+            if touches.any() and touched.any():
+                begins = np.cumsum([0.0, *map(lane.getLength, parts[:-1])])
+                here, there = along[touches], their_along[touched]
+                found.append(
+                    _NearPath(
+                        (float(here[0]), float(here[-1])),
+                        (float(there[0]), float(there[-1])),
+                        tuple(zip(parts, begins.tolist(), strict=True)),
+                        place < number,
+                    )
+                )
+        return tuple(found)
+
+    def _join_shapes(self, lanes: Sequence[str]) -> FloatArray:
+        """Centre line over lanes that follow one another, shape (points, 2), m."""
+        shape = self._sumo.lane.getShape
+        first, *rest = lanes
+        points = [*shape(first), *(point for name in rest for point in shape(name)[1:])]
+        return np.array(points)[:, :2]
 
     def _list_upstream(self, last: str) -> list[tuple[str, float]]:
         """Lanes that lead to a stop line, with the metres from their begin to it."""
@@ -608,6 +721,15 @@ def _find_touching(
         _find_run(along, _find_touching_fronts(own, others), meeting[0]),
         _find_run(theirs, _find_touching_fronts(others, own), meeting[1]),
     )
+
+
+def _turns_alike(path: FloatArray, other: FloatArray) -> bool:
+    """Whether both paths turn to the same side, by more than a bend."""
+    sides = []
+    for line in (path, other):
+        (ax, ay), (bx, by) = line[1] - line[0], line[-1] - line[-2]
+        sides.append(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
+    return min(map(abs, sides)) > _BEND and sides[0] * sides[1] > 0.0
 
 
 def _place_on(path: FloatArray) -> tuple[FloatArray, FloatArray]:
