@@ -208,3 +208,34 @@ def touching_turns(folder: Path, *, looks: bool, step: str) -> tuple[int, int]:
 def test_turns_that_pass_beside_each_other_do_not_touch(step: str, tmp_path: Path) -> None:
     assert touching_turns(tmp_path, looks=True, step=step) == (0, 80)
     assert touching_turns(tmp_path, looks=False, step=step)[0] >= 3
+
+
+def test_a_route_may_begin_inside_a_junction(net: Path, tmp_path: Path) -> None:
+    routes = tmp_path / "inside.xml"
+    with open_session(["-n", str(net), "--no-step-log"]) as session:
+        lanes, edge_of = session.lanes, session._sumo.lane.getEdgeID
+        begins = [
+            (edge_of(via), edge_of(link[0]))
+            for name, links in lanes.links_of.items()
+            if name not in lanes.internal
+            for link in links
+            if (via := link[4]).startswith(":J10001") and lanes.admits(via, "passenger")
+        ]
+    routes.write_text(
+        f"<routes>{CAR}{BUS}"
+        + "".join(
+            f'<vehicle id="{kind}{number}" type="{kind}" depart="{10 * number}"><route'
+            f' edges="{inside} {onto}"/></vehicle>'
+            for number, (inside, onto) in enumerate(begins)
+            for kind in ("car", "bus")
+        )
+        + "</routes>"
+    )
+    with open_session(["-n", str(net), "-r", str(routes), "--no-step-log"]) as session:
+        while session.time < 600.0 and session.expected():
+            session.turning_gaps.before_step()
+            session.turn_exits.before_step()
+            session.curve_speeds.before_step()
+            session.step()
+            session.turning_gaps.after_step()
+        assert session.expected() == 0

@@ -38,6 +38,8 @@ MARGIN = 0.3
 """Seconds from when a body has left the place where paths cross to when the next one is there."""
 _BEHIND = 0.3
 """Seconds behind a body that is past that place."""
+_BEHIND_WIDE = 1.5
+"""The same of a truck or bus, whose corner is on the other path a metre earlier."""
 _LONGEST_STEP = 0.5
 """Seconds of a step up to which this is done; with steps of 1 s some touched."""
 _NEAR = 20.0
@@ -148,9 +150,10 @@ class _Route(NamedTuple):
 
 
 class _Body(NamedTuple):
-    """What never changes of a vehicle: length, m, acceleration, m/s2, and factor on limits."""
+    """What never changes of a vehicle: length, width, m, acceleration, m/s2, factor on limits."""
 
     length: float
+    width: float
     gains: float
     factor: float
 
@@ -236,6 +239,9 @@ class TurningGaps:
                 if lane not in lanes:
                     self._forget_vehicle(name)
                     self._plan_look(name, 1)
+            elif self._body_of(name).length > _LONGEST:
+                if lane == turn.waiting and self._may_go(turn, lane, lights):
+                    self._passed_by(name, turn)  # it takes SUMO's gaps, and waits for bodies
             elif lane != turn.waiting:
                 self._set_ignored(name, self._passed_on_way(name, turn))
             elif not self._may_go(turn, lane, lights):
@@ -304,9 +310,7 @@ class TurningGaps:
 
     def _look_at(self, name: str) -> None:
         """Note a vehicle that is near a turn; else say when it may be, at the earliest."""
-        length, gains, factor = self._body_of(name)
-        if length > _LONGEST:
-            return
+        _, _, gains, factor = self._body_of(name)
         lane, index = self._lane_of(name), self._index_of(name)
         if not lane or index < 0:  # it is being teleported
             self._plan_look(name, self._count_steps(1.0))
@@ -387,7 +391,9 @@ class TurningGaps:
             of = self._sumo.vehicle
             if len(self._bodies) >= _MOST_KEPT:
                 self._bodies.clear()
-            body = _Body(of.getLength(name), of.getAccel(name), of.getSpeedFactor(name))
+            body = _Body(
+                of.getLength(name), of.getWidth(name), of.getAccel(name), of.getSpeedFactor(name)
+            )
             self._bodies[name] = body
         return body
 
@@ -401,8 +407,9 @@ class TurningGaps:
         angle, the two would touch beside that place, so it is held until they do not.
         """
         free = []
+        behind = _BEHIND if self._body_of(name).width <= _WIDTH else _BEHIND_WIDE
         for other, passes, own in self._find_oncoming(name, turn, waits=True):
-            if passes[0] <= own[1] and passes[1] + _BEHIND >= own[0]:
+            if passes[0] <= own[1] and passes[1] + behind >= own[0]:
                 if passes[1] < math.inf and self._speed_of(name) < _STANDING:
                     self._sumo.vehicle.setSpeed(name, 0.0)
                     self._held.append(name)
@@ -483,7 +490,7 @@ class TurningGaps:
 
         The margin is in the second of one who waits.
         """
-        length, gains, factor = self._body_of(name)
+        length, _, gains, factor = self._body_of(name)
         front = self._position_of(name) - (turn.length if waits else 0.0)
         speed, limit = self._speed_of(name), turn.speed * factor
         return (
@@ -503,7 +510,7 @@ class TurningGaps:
 
     def _time_passage(self, name: str, to_line: float, crossing: _Crossing) -> tuple[float, float]:
         """Seconds to when a vehicle is where paths cross, at least, and to when it is past."""
-        length, gains, factor = self._body_of(name)
+        length, _, gains, factor = self._body_of(name)
         speed, inside = self._speed_of(name), crossing.inside * factor
         first = crossing.there[0]
         if to_line > 0.0:
@@ -631,6 +638,8 @@ class TurningGaps:
         """
         lane = self._sumo.lane
         entries = self._find_entries[self._junction_behind(source)]
+        if (source, onto, own[0]) not in entries:  # a route that begins inside the junction
+            return ()
         number = entries.index((source, onto, own[0]))
         path, found = self._join_shapes(own), []
         for place, (other, other_onto, via) in enumerate(entries):
