@@ -1,4 +1,4 @@
-"""A dataset for learners: sampled runs, in shards with a card, read back as arrays.
+"""A dataset for learners: sampled runs, in shards with a card, read back run by run and in batches.
 
 Run it with ``python examples/make_dataset.py [WORKSPACE]``.
 """
@@ -30,9 +30,11 @@ def make(workspace: odscen.Workspace) -> None:
     folder = workspace.root / "junctions"
     facts = datasets.make_dataset(workspace, plan, folder, processes=2)
     print(f"{facts.table.height} runs, {sum(size for size, _ in facts.files.values())} bytes")
-    (first, *_) = sorted(folder.rglob("*.npz"))
-    arrays = datasets.read_arrays(first)
-    print(f"{first.name}: {len(arrays)} arrays, {arrays['agent_id'].size} road users")
+    runs = datasets.open_dataset(folder, split="train")
+    arrays = runs[0]
+    print(f"first run: {len(arrays)} arrays, {arrays['agent_id'].size} road users")
+    for batch in datasets.batches(runs, 2, **runs.sizes):
+        print(f"batch: {batch['agent_state'].shape}, {batch['lane_valid'].sum()} lanes")
 
 
 if __name__ == "__main__":

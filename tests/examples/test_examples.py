@@ -137,7 +137,11 @@ def test_the_edited_scene_is_undone_timed_and_run(workspace: Path) -> None:
         ("map_pictures.py", r"drawn: .*segments\.svg\neastbound \S+ at \d\.\d m, westbound \S+"),
         ("critical_gap.py", r"ttc 1\.0 s: not safe\n[^$]*ttc 5\.0 s: safe\n\d of 4 cases are"),
         ("gate_a_change.py", r"again: 0\nnarrowed: 1 the map: width of lane .*: 3\.25 m -> 2\.4 m"),
-        ("make_dataset.py", r"^2 runs, \d{6,} bytes\n.*\.npz: \d\d arrays, \d+ road users"),
+        (
+            "make_dataset.py",
+            r"^2 runs, \d{5,} bytes\nfirst run: \d\d arrays, \d+ road users\n"
+            r"batch: \(2, \d+, \d+, 5\), [1-9]\d* lanes",
+        ),
         ("own_driver.py", r"sumo: mean speed [\d.]+ m/s\ndawdlers: mean speed [\d.]+ m/s"),
         ("own_generator.py", r"(\d+) cars, of them \1 moving\nproblems: none"),
         ("rain_study.py", r"as-designed: [\d.]+ m/s\nhard-rain: [\d.]+ m/s"),

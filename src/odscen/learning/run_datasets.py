@@ -10,7 +10,7 @@ import json
 import tarfile
 from collections import OrderedDict
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -34,6 +34,15 @@ HUGGINGFACE: Final = "huggingface"
 TAR_SUFFIX: Final = ".tar"
 FACTS_FILE: Final = "dataset.json"
 _KEPT_MAPS: Final = 4
+
+
+class BatchSizes(TypedDict, total=False):
+    """What fits all runs of a split, as :func:`batches` takes it by ``**``."""
+
+    agents: int
+    lights: int
+    steps: int
+    lanes: int
 
 
 class _Place(NamedTuple):
@@ -75,7 +84,7 @@ class RunDataset:
     form: str
     transform: Callable[[dict[str, Array]], Any] | None = None
     with_map: bool = True
-    sizes: Mapping[str, int] = field(default_factory=dict)
+    sizes: BatchSizes = field(default_factory=BatchSizes)
 
     def __post_init__(self) -> None:
         self._places = list(_find_runs(self.folder / self.split / self.form, self.form))
@@ -166,7 +175,7 @@ def open_dataset(
     return found
 
 
-def _read_facts(folder: Path, split: str) -> tuple[list[str], dict[str, int], dict[str, int]]:
+def _read_facts(folder: Path, split: str) -> tuple[list[str], dict[str, int], BatchSizes]:
     """Formats of a dataset, runs of each of its splits, and sizes of one."""
     file = folder / FACTS_FILE
     if not file.is_file():
@@ -175,10 +184,13 @@ def _read_facts(folder: Path, split: str) -> tuple[list[str], dict[str, int], di
         said = json.loads(read_given(file))
         formats = [str(form) for form in said["plan"]["formats"]]
         runs = {str(row["split"]): int(row["runs"]) for row in said["splits"]}
-        sizes: dict[str, int] = {}
-        for row in said["maps"]:
-            for name, size in row.get("most", {}).items() if row["split"] == split else ():
-                sizes[str(name)] = max(int(size), sizes.get(str(name), 0))
+        sizes = BatchSizes()
+        own = [row["most"] for row in said["maps"] if row["split"] == split and row.get("most")]
+        if own:
+            sizes["agents"] = max(int(most["agents"]) for most in own)
+            sizes["lights"] = max(int(most["lights"]) for most in own)
+            sizes["steps"] = max(int(most["steps"]) for most in own)
+            sizes["lanes"] = max(int(most["lanes"]) for most in own)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError("it does not say what the dataset has", file=str(file)) from error
     return formats, runs, sizes
