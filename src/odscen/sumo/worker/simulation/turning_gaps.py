@@ -34,12 +34,13 @@ if TYPE_CHECKING:
     from odscen.base.arrays import FloatArray
     from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
-MARGIN = 0.3
+MARGIN = 0.1
 """Seconds from when a body has left the place where paths cross to when the next one is there."""
-_BEHIND = 0.3
+_BEHIND = 0.2
 """Seconds behind a body that is past that place."""
-_BEHIND_WIDE = 1.5
-"""The same of a truck or bus, whose corner is on the other path a metre earlier."""
+_CORNER, _SIDE = 1.3, 0.5
+"""Seconds more where a truck or bus turns, whose corner is on the other path a metre earlier, and
+where one comes."""
 _LONGEST_STEP = 0.5
 """Seconds of a step up to which this is done; with steps of 1 s some touched."""
 _NEAR = 20.0
@@ -407,8 +408,9 @@ class TurningGaps:
         angle, the two would touch beside that place, so it is held until they do not.
         """
         free = []
-        behind = _BEHIND if self._body_of(name).width <= _WIDTH else _BEHIND_WIDE
+        corner = _CORNER if self._body_of(name).width > _WIDTH else 0.0
         for other, passes, own in self._find_oncoming(name, turn, waits=True):
+            behind = _BEHIND + (corner or _SIDE * (self._body_of(other).width > _WIDTH))
             if passes[0] <= own[1] and passes[1] + behind >= own[0]:
                 if passes[1] < math.inf and self._speed_of(name) < _STANDING:
                     self._sumo.vehicle.setSpeed(name, 0.0)
