@@ -1,7 +1,10 @@
 import { useMemo } from "react";
 
+import type { Actor, Flow } from "../api/types";
+import type { Place } from "../map/graph";
 import type { Scene } from "../map/scene";
 import { sceneDetectors } from "../signals/sceneDetectors";
+import type { Tool } from "./handlers/handler";
 import { ruleShapes } from "./rules/ruleShapes";
 import { laneFacts } from "./placeWords";
 import { segmentStyles, type Step } from "./scene";
@@ -14,6 +17,17 @@ const MEASURED: ReadonlySet<Step> = new Set<Step>(["traffic", "measures", "run"]
 /** In which rules are drawn. */
 const RULED: ReadonlySet<Step> = new Set<Step>(["rules", "run"]);
 const SERVED: ReadonlySet<Step> = new Set<Step>(["traffic", "transit", "run"]);
+
+/**
+ * Goals that are suggested on the map: while one is chosen, or of who has none yet.
+ *
+ * With something else in the hand they would hide the starts, and a hundred of them the goal that is set.
+ */
+export const suggestedGoals = (
+  tool: Pick<Tool, "goals"> | null,
+  one: Pick<Actor | Flow, "goal"> | null | undefined,
+  goals: readonly Place[] | null,
+): readonly Place[] => ((tool ? tool.goals : !one?.goal) ? (goals ?? []) : []);
 
 /** What the map shows of the editor as it is now. */
 export function useScene(now: EditorNow): Scene {
@@ -75,8 +89,7 @@ export function useScene(now: EditorNow): Scene {
       },
       actors,
       flows,
-      // With something else in the hand they would hide the starts.
-      goals: placing && (tool?.goals ?? true) ? (goals ?? []) : [],
+      goals: placing ? suggestedGoals(tool, one, goals) : [],
       chosenGoal: placing && one?.goal ? (graph.place(one.goal) ?? null) : null,
       route: placing ? route : [],
       waypoints: placing && one ? viasOf(one).flatMap((id) => graph.place(id) ?? []) : [],

@@ -40,6 +40,19 @@ test("what is found is chosen with arrow keys and Enter, or by a click", async (
   expect(onGo).toHaveBeenLastCalledWith({ is: "one", id: "car-1", kind: "Car" });
 });
 
+test("what is chosen closes the search, and keys act on the map again", async () => {
+  const onClose = vi.fn();
+  const { user } = show(
+    <>
+      <div className="map" role="application" tabIndex={0} />
+      <FindDialog graph={town} ones={ones} commands={[]} onGo={vi.fn()} onClose={onClose} />
+    </>,
+  );
+  await user.type(await screen.findByRole("combobox", { name: /^Name of a place/ }), "r12{Enter}");
+  expect(onClose).toHaveBeenCalledOnce();
+  expect(document.activeElement?.className).toBe("map");
+});
+
 test("a search that finds nothing says so, and Enter then does nothing", async () => {
   const onGo = vi.fn();
   const { user } = show(<FindDialog graph={graph} ones={[]} commands={[]} onGo={onGo} onClose={vi.fn()} />);

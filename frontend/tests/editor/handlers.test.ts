@@ -12,6 +12,7 @@ import { placeTool } from "../../src/editor/handlers/place";
 import { waypointTool } from "../../src/editor/handlers/waypoint";
 import type { Picked, PickBy, PlacePick } from "../../src/editor/pick";
 import { everyone, Starts } from "../../src/editor/placing";
+import { suggestedGoals } from "../../src/editor/useScene";
 import { insideRows, sceneActors, sceneFlows, type Step } from "../../src/editor/scene";
 import { inBounds, inCircle, inRing } from "../../src/map/areas";
 import type { Pointed } from "../../src/map/MapCanvas";
@@ -603,4 +604,14 @@ test("a place may be on a walkway or the ground, and the ground has no name", ()
   expect(picked("place", [[40, 90.123]]).found).toMatchObject([{ name: "", x: 40, y: 90.12 }]);
   expect(picked("goal", [[40, 90]]).found).toEqual([]);
   expect(picked("ground", [[4, 0]]).found).toMatchObject([{ name: "", x: 4, y: 0 }]);
+});
+
+test("goals are suggested while one is chosen and to who has none, not beside the goal that is set", () => {
+  const goals = [place("1.0.-1.1"), place("1.0.-1.2")];
+  const [without, has] = [actor("car-1"), { ...actor("car-2"), goal: "1.0.-1.1" }];
+  expect(suggestedGoals(null, { ...without, goal: null }, goals)).toEqual(goals);
+  expect(suggestedGoals(null, has, goals)).toEqual([]);
+  expect(suggestedGoals(goalTool("car-2"), has, goals)).toEqual(goals);
+  expect(suggestedGoals(placeTool("car"), { ...without, goal: null }, goals)).toEqual([]);
+  expect(suggestedGoals(null, null, null)).toEqual([]);
 });
