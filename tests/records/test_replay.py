@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import polars as pl
 import pytest
 
-from odscen.records.replay import speeds_of_positions
+from odscen.figures.measures.motion import check_motion
+from odscen.records.replay import body_centres, speeds_of_positions
+from odscen.records.run_plan import Plan, PlannedActor
 
 STEPS = pytest.mark.parametrize("step", [0.05, 0.1, 0.2, 0.5, 1.0])
 
@@ -55,3 +58,30 @@ def test_road_users_are_told_apart():
     found = speeds(time, np.where(row == 0, 3.0 * time, 0.0), 0.0, 0.0, 1.0, row=row)
     assert found[row == 0] == pytest.approx([1.0] + [3.0] * 9)
     assert found[row == 1] == pytest.approx([1.0] + [0.0] * 9)
+
+
+def test_a_pedestrian_who_turns_on_the_spot_stands():
+    """In SUMO the place is that of the front, which a turn moves by half a step."""
+    plan = Plan(
+        scenario="s", seed=0, net_offset=(0.0, 0.0), until=10.0, step_length=0.1,
+        actors=(
+            PlannedActor(
+                id="p", category="pedestrian", spawn="n", goal=None, depart=0.0, length=0.3,
+                width=0.5, x=0.0, y=0.0, z=0.0, hdg=0.0,
+            ),
+        ),
+    )  # fmt: skip
+    time = np.arange(20) * 0.1
+    hdg = np.where(time < 1.0, 0.0, np.pi / 2.0)
+    walked = np.maximum(time - 1.0, 0.0) * 1.4
+    recorded = pl.DataFrame(
+        {
+            "time": time, "id": ["p"] * 20, "x": 0.15 * np.cos(hdg),
+            "y": walked + 0.15 * np.sin(hdg), "angle": 90.0 - np.degrees(hdg), "speed": 0.0,
+        }
+    )  # fmt: skip
+    found = body_centres(recorded, plan)
+    assert found["speed"].to_numpy() == pytest.approx(np.where(time > 1.05, 1.4, 0.0), abs=1e-9)
+    moved = check_motion(found, plan)
+    assert moved is not None
+    assert moved.filter(pl.col("kind") == "recorded speed").is_empty()

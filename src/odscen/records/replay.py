@@ -48,7 +48,8 @@ def body_centres(
         One row per road user and record, sorted by time; columns ``time``, ``id``, ``category``,
         ``row`` (of the plan), ``x``, ``y``, ``hdg``, ``speed``, and of ``z``, ``lane``, ``pos``,
         ``slope_deg`` those that were recorded. Rows without a place are left out. ``speed`` (m/s)
-        is that of the front's positions, or of the centre's, see :func:`speeds_of_positions`.
+        is that of the front's positions, or of the centre's, as of all pedestrians, see
+        :func:`speeds_of_positions`.
     """
     import polars as pl
 
@@ -81,8 +82,9 @@ def body_centres(
     time, row, speed = (rows[name].to_numpy() for name in ("time", "row", "speed"))
     walking = (rows["category"] == Category.PEDESTRIAN).to_numpy()
     pose = sumo_to_xodr(SumoPose(x, y, 0.0, angle), length=length, net_offset=plan.net_offset)
-    if by_centres:
-        x, y = np.asarray(pose.x), np.asarray(pose.y)
+    # People turn on the spot, which moves their front by half a step.
+    centred = walking | by_centres
+    x, y = np.where(centred, pose.x, x), np.where(centred, pose.y, y)
     extra = [name for name in _OPTIONAL.values() if name in rows.columns]
     return rows.with_columns(
         pl.col("row").cast(pl.Int64),
@@ -104,7 +106,7 @@ def speeds_of_positions(
     *,
     by_centres: bool = False,
 ) -> FloatArray:
-    """Speeds at which road users really moved: their fronts, or their centres.
+    """Speeds at which road users really moved: fronts of vehicles, or their centres.
 
     SUMO's speed is that along the centre line of a lane of the length that its edge has: it leaves
     out what a vehicle moves aside, is that of another arc beside the centre, and of a person
@@ -117,7 +119,7 @@ def speeds_of_positions(
         Of shape ``(N,)``, sorted by time: seconds, number of the road user, metres, SUMO's angle,
         m/s.
     walking
-        Who is on foot, of shape ``(N,)``.
+        Who is on foot, of shape ``(N,)``; places are those of centres there.
     by_centres
         Whether places and speeds are those of centres. Bodies turn about these without moving them,
         so that a way is anything from the chord to the arc.
@@ -146,6 +148,7 @@ def speeds_of_positions(
     covered = straight * half / np.sin(half)
     if by_centres:
         covered = np.clip(old[1:], straight, covered)
+    covered = np.where(walking[1:], straight, covered)
     error = np.where(same, covered - old[1:], 0.0)
     same &= np.abs(error) * passed < _JUMPED + _UNSEEN * passed
     error = np.where(same, error, 0.0)

@@ -368,8 +368,9 @@ def _check_steps(
     )
 
     # Speed of the front, which SUMO's speed is of: the arc over the chord between two places.
-    front_x = x + 0.5 * length * np.cos(hdg)
-    front_y = y + 0.5 * length * np.sin(hdg)
+    # People turn on the spot, so theirs is that of the centre.
+    reach = np.where(limits[0] < math.inf, 0.5 * length, 0.0)
+    front_x, front_y = x + reach * np.cos(hdg), y + reach * np.sin(hdg)
     chord = np.hypot(front_x[later] - front_x[now], front_y[later] - front_y[now])
     half = np.minimum(np.abs(turned), 2.0) / 2.0
     covered = chord * np.where(half > 1e-6, half / np.maximum(np.sin(half), 1e-9), 1.0) / dt
