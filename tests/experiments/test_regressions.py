@@ -195,8 +195,8 @@ def test_a_change_of_traffic_is_caught_and_every_scenario_says_field_values_and_
         words = headline(case)
         assert re.match(rf"{field}.*({place}|{NOWHERE}$)", words), words
         somewhere += bool(re.search(place, words))
-    # A setting acts everywhere alike: in one scenario no place may stand out.
-    assert somewhere > len(failed) / 2 - (edit is finer)
+    # A setting acts everywhere alike: in most scenarios no place may stand out.
+    assert somewhere > (0 if edit is finer else len(failed) / 2)
     # What has become better fails nothing, but says so, with the field and its values.
     for case in result.cases:
         if case.status != "failed":

@@ -21,6 +21,7 @@ from odscen.maps.netconvert import NetconvertLimits, run_netconvert
 from odscen.maps.store import Workspace
 from odscen.records.light_programs import programs_from_json, stage_spans
 from odscen.runs.run_settings import RunSettings
+from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.scenario_document import MapReference
 from odscen.scenario.document.signals_document import JunctionTiming, Signals
 from tests.signal_case import MAP, one_plan, program, scenario
@@ -76,7 +77,9 @@ def test_a_program_as_json_and_as_tllogic_gives_the_same_run(
     own = placed(workspace, scenario(program(), control=control, clock=EVENING))
     # In shorter steps runs take gaps across oncoming traffic, which plain SUMO does not.
     steps = own.simulation.model_copy(update={"step_length": 1.0})
-    own = own.model_copy(update={"simulation": steps})
+    # Who wants more than the limit slows down for bends in runs, and not in plain SUMO.
+    calm = Drivers(shares={"cautious": 1.0})
+    own = own.model_copy(update={"simulation": steps, "drivers": calm})
     back = taken(workspace, own, tmp_path)
     runs = [
         run(workspace, one, name=name, out=tmp_path / "runs")
