@@ -263,13 +263,13 @@ def _describe_tracks(parts: Sequence[Mapping[str, Any]]) -> list[object]:
         f"{seconds / 3600:,.2f}",
         f"{metres / 1000:,.1f}",
         f"{metres / seconds:.1f}",
-        f"{_quantile(states, 0.5):.1f}",
-        f"{_quantile(states, 0.95):.1f}",
+        f"{_find_quantile(states, 0.5):.1f}",
+        f"{_find_quantile(states, 0.95):.1f}",
         f"{100 * states[0] / states.sum():.0f}",
     ]
 
 
-def _quantile(states: FloatArray, share: float) -> float:
+def _find_quantile(states: FloatArray, share: float) -> float:
     """Speed that a share of the states is not above, m/s."""
     return float(np.searchsorted(np.cumsum(states), share * states.sum())) * SPEED_STEP
 

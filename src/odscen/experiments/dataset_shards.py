@@ -187,7 +187,7 @@ def _write_tar(shard: Path, source: ShardSource, runs: Sequence[str]) -> None:
             for path in source.files(WEBDATASET, run):
                 content = path.read_bytes()
                 about = _write_map_beside(shard.parent, source, content, str(path))
-                said = {**about, "run": run, "figures": _finite(source.rows.get(run, {}))}
+                said = {**about, "run": run, "figures": _keep_finite(source.rows.get(run, {}))}
                 text = json.dumps(said, ensure_ascii=False, allow_nan=False).encode()
                 for ending, data in (("json", text), ("npz", content)):
                     name = f"{keys[run]}.{ending}"
@@ -206,7 +206,7 @@ def _sample_keys(runs: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def _finite(row: Mapping[str, Any]) -> dict[str, Any]:
+def _keep_finite(row: Mapping[str, Any]) -> dict[str, Any]:
     """Values of a row that JSON can carry."""
     return {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
@@ -253,10 +253,10 @@ def _as_row(said: Mapping[str, Any], arrays: Mapping[str, Array]) -> pl.DataFram
 
     own = {name: values for name, values in arrays.items() if not name.endswith("about")}
     columns = [pl.Series(name, [value]) for name, value in said.items()]
-    return pl.DataFrame([*columns, *(_nested(name, values) for name, values in own.items())])
+    return pl.DataFrame([*columns, *(_nest_values(name, values) for name, values in own.items())])
 
 
-def _nested(name: str, values: Array) -> pl.Series:
+def _nest_values(name: str, values: Array) -> pl.Series:
     """An array as one value of a column."""
     import polars as pl
 

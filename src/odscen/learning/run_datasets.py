@@ -94,7 +94,7 @@ class RunDataset:
         return len(self._places)
 
     def __getitem__(self, number: int) -> Any:
-        arrays = self._read(self._places[number])
+        arrays = self._read_run(self._places[number])
         return arrays if self.transform is None else self.transform(arrays)
 
     def __iter__(self) -> Iterator[Any]:
@@ -107,7 +107,7 @@ class RunDataset:
     def __repr__(self) -> str:
         return f"<RunDataset {self.folder} {self.split} ({self.form}): {len(self)} runs>"
 
-    def _read(self, place: _Place) -> dict[str, Array]:
+    def _read_run(self, place: _Place) -> dict[str, Array]:
         label = f"{place.file}: {place.name}" if place.name else str(place.file)
         arrays = own_arrays(_read_part(place, label), file=label)
         named = named_map(arrays, file=label)
@@ -306,36 +306,36 @@ def _padded_run(
     agents, lights, steps = sizes["agents"], sizes["lights"], sizes["steps"]
     valid, state = run["agent_valid"], run["agent_state"]
     origin = state[valid][:, :2].mean(axis=0) if valid.any() else np.zeros(2)
-    there = np.where(valid[..., None], _moved(state, origin), 0.0)
+    there = np.where(valid[..., None], _move_points(state, origin), 0.0)
     count = len(run["time"])
     found = {
         "origin": origin,
-        "time": _filled(run["time"], (steps,), np.float32),
+        "time": _fill_array(run["time"], (steps,), np.float32),
         "time_valid": np.arange(steps) < count,
-        "agent_state": _filled(there, (agents, steps, state.shape[2]), np.float32),
-        "agent_valid": _filled(valid, (agents, steps), np.bool_),
-        "agent_size": _filled(run["agent_size"], (agents, 3), np.float32),
+        "agent_state": _fill_array(there, (agents, steps, state.shape[2]), np.float32),
+        "agent_valid": _fill_array(valid, (agents, steps), np.bool_),
+        "agent_size": _fill_array(run["agent_size"], (agents, 3), np.float32),
         "agent_category": _category_numbers(run["agent_category"], agents),
-        "agent_is_ego": _filled(run["agent_is_ego"], (agents,), np.bool_),
-        "light_color": _filled(run["light_color"], (lights, steps), np.uint8),
-        "light_stop": _filled(_moved(run["light_stop"], origin), (lights, 3), np.float32),
+        "agent_is_ego": _fill_array(run["agent_is_ego"], (agents,), np.bool_),
+        "light_color": _fill_array(run["light_color"], (lights, steps), np.uint8),
+        "light_stop": _fill_array(_move_points(run["light_stop"], origin), (lights, 3), np.float32),
         "light_valid": np.arange(lights) < len(run["light_lane"]),
     }
     if sizes["lanes"]:
         points = _lane_points(run, origin, lane_points)
-        found["lane_point"] = _filled(points, (sizes["lanes"], lane_points, 9), np.float32)
+        found["lane_point"] = _fill_array(points, (sizes["lanes"], lane_points, 9), np.float32)
         found["lane_valid"] = np.arange(sizes["lanes"]) < len(points)
     return found
 
 
-def _moved(points: Array, origin: Array) -> Array:
+def _move_points(points: Array, origin: Array) -> Array:
     """Points x, y, ... relative to an origin."""
     moved = points.astype(np.float64)
     moved[..., :2] -= origin
     return moved
 
 
-def _filled(values: Array, shape: tuple[int, ...], kind: type[np.generic]) -> Array:
+def _fill_array(values: Array, shape: tuple[int, ...], kind: type[np.generic]) -> Array:
     """Values at the beginning of an array of a shape, which is zero elsewhere."""
     whole = np.zeros(shape, dtype=kind)
     whole[tuple(slice(0, count) for count in values.shape)] = values
