@@ -9,15 +9,15 @@ once its body has left the curve.
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.bends import largest_curvature
 from odscen.sumo.worker.simulation.foreign_traffic import is_foreign
+from odscen.sumo.worker.simulation.planned_looks import PlannedLooks, seconds_to
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator
+    from collections.abc import Callable, Collection
 
     from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
@@ -59,11 +59,7 @@ class CurveSpeeds:
     ) -> None:
         self._sumo, self._errors, self._lanes = sumo, errors, lanes
         self._factor_of = native("vehicle", "getSpeedFactor")
-        self._departed_number, self._departed = (
-            native("simulation", f"getDeparted{what}") for what in ("Number", "IDList")
-        )
-        self._step, self._step_length = -1, 0.0
-        self._due: dict[int, list[str]] = {}
+        self._looks = PlannedLooks(sumo, native)
         self._wanted: dict[str, float] = {}
         self._slowed: set[str] = set()
         self._bent: dict[str, bool] = {}
@@ -80,23 +76,15 @@ class CurveSpeeds:
         moved
             Whose speed something else chooses.
         """
-        if self._step < 0:
-            self._step_length = float(self._sumo.simulation.getDeltaT())
-        self._step += 1
-        if self._step == 0:
-            names: Iterable[str] = self._sumo.vehicle.getIDList()
-        elif self._departed_number():
-            names = self._departed()
-        else:
-            names = ()
-        for name in names:
+        wanting = []
+        for name in self._looks.next_step():
             if is_foreign(name) or (only is not None and name not in only):
                 continue
             with suppress(*self._errors):  # a rule may have removed it at once
                 if (factor := float(self._factor_of(name))) > FASTEST:
                     self._wanted[name] = factor
-                    self._due.setdefault(self._step, []).append(name)
-        for name in self._due.pop(self._step, ()):
+                    wanting.append(name)
+        for name in (*wanting, *self._looks.take_due()):
             try:
                 self._look_at(name, is_moved=name in moved)
             except self._errors:  # it has arrived
@@ -108,16 +96,8 @@ class CurveSpeeds:
         for name in sorted(self._slowed):
             with suppress(*self._errors):
                 self._sumo.vehicle.setSpeedFactor(name, self._wanted[name])
-        waiting = sorted(self._wanted)
         self._slowed.clear()
-        self._due.clear()
-        if self._step >= 0:
-            self._due[self._step + 1] = waiting
-
-    def _plan_look(self, name: str, seconds: float) -> None:
-        """Look again when so many seconds have passed, a step early, or in the next step."""
-        steps = max(1, int(min(seconds, _LONGEST_WAIT) / self._step_length) - 1)
-        self._due.setdefault(self._step + steps, []).append(name)
+        self._looks.plan_all_now()
 
     def _look_at(self, name: str, *, is_moved: bool) -> None:
         vehicle = self._sumo.vehicle
@@ -129,7 +109,7 @@ class CurveSpeeds:
         if slows != (name in self._slowed):
             vehicle.setSpeedFactor(name, IN_CURVES if slows else self._wanted[name])
             (self._slowed.add if slows else self._slowed.discard)(name)
-        self._plan_look(name, again)
+        self._looks.plan(name, min(again, _LONGEST_WAIT))
 
     def _look_ahead(self, name: str, lane: str) -> tuple[bool, float]:
         """Whether a vehicle is to slow down for a curve, and seconds for which that is so.
@@ -141,37 +121,23 @@ class CurveSpeeds:
         gains, rest = vehicle.getAccel(name), of.getLength(lane) - position
         twice = 2.0 * _BRAKING * vehicle.getDecel(name)
         if self._is_bent(lane):
-            return True, _seconds_to(rest, speed, gains)
+            return True, seconds_to(rest, speed, gains)
         if name in self._slowed and position < (length := vehicle.getLength(name)):
-            return True, _seconds_to(length - position, speed, gains)
-        likely = speed + gains * self._step_length
+            return True, seconds_to(length - position, speed, gains)
+        likely = speed + gains * self._looks.step_length
         horizon = (likely + gains * _LONGEST_WAIT) * _LONGEST_WAIT + _SPARE
         horizon += (likely + gains * _LONGEST_WAIT) ** 2 / twice
-        for ahead in self._lanes_ahead(name, lane):
+        for ahead in self._lanes.ahead(name, lane):
             if rest > horizon:
                 break
             if self._is_bent(ahead):
                 slow = of.getMaxSpeed(ahead) * IN_CURVES
                 braking = max(0.0, likely * likely - slow * slow) / twice
-                spare = rest - likely * self._step_length - braking - _SPARE
+                spare = rest - likely * self._looks.step_length - braking - _SPARE
                 # Who gains speed meanwhile needs more room for braking, too.
                 return (True, 0.0) if spare <= 0.0 else (False, spare / (3.0 * max(likely, slow)))
             rest += of.getLength(ahead)
         return False, _LONGEST_WAIT
-
-    def _lanes_ahead(self, name: str, lane: str) -> Iterator[str]:
-        """Lanes that a vehicle comes to on its route, those inside junctions too."""
-        vehicle, edge_of = self._sumo.vehicle, self._sumo.lane.getEdgeID
-        edges = iter(vehicle.getRoute(name)[max(0, vehicle.getRouteIndex(name)) + 1 :])
-        while True:
-            links = self._lanes.links_of[lane]
-            if lane not in self._lanes.internal:
-                onto = next(edges, None)
-                links = tuple(link for link in links if edge_of(link[0]) == onto)
-            if not links:
-                return
-            lane = links[0][4] or links[0][0]
-            yield lane
 
     def _is_bent(self, lane: str) -> bool:
         """Whether a lane bends so much that a factor on its limit would be felt."""
@@ -183,8 +149,3 @@ class CurveSpeeds:
                 speed * speed * largest_curvature(of.getShape(lane), _WINDOW) > _SIDEWAYS
             )
         return known
-
-
-def _seconds_to(metres: float, speed: float, gains: float) -> float:
-    """Seconds in which a vehicle that gains speed all the time drives so many metres."""
-    return (math.sqrt(speed * speed + 2.0 * gains * metres) - speed) / gains

@@ -8,12 +8,13 @@ centre by as many metres as before.
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.sumo.worker.simulation.planned_looks import PlannedLooks, seconds_to
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable
+    from collections.abc import Callable, Collection
 
     from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
@@ -58,12 +59,8 @@ class LateralPlaces:
     ) -> None:
         self._sumo, self._errors, self._lanes = sumo, errors, lanes
         self._beside = native("vehicle", "getLateralLanePosition")
-        self._departed_number, self._departed = (
-            native("simulation", f"getDeparted{what}") for what in ("Number", "IDList")
-        )
-        self._step, self._step_length = -1, 0.0
-        self._is_left_to_sumo = False
-        self._due: dict[int, list[str]] = {}
+        self._looks = PlannedLooks(sumo, native)
+        self._is_left_to_sumo: bool | None = None
         self._entries: dict[str, _Entry] = {}
         self._lane_sizes: dict[str, tuple[float, float]] = {}
 
@@ -85,34 +82,26 @@ class LateralPlaces:
         placed
             Of these, who is put somewhere, and left alone here.
         """
-        if self._step < 0:
-            simulation = self._sumo.simulation
-            self._step_length = float(simulation.getDeltaT())
-            sublane = float(simulation.getOption("lateral-resolution") or 0.0) > 0.0
-            self._is_left_to_sumo = sublane or self._step_length > _LONGEST_STEP
         if self._is_left_to_sumo:
             return
-        self._step += 1
+        names = self._looks.next_step()
+        if self._is_left_to_sumo is None:
+            sublane = float(self._sumo.simulation.getOption("lateral-resolution") or 0.0) > 0.0
+            self._is_left_to_sumo = sublane or self._looks.step_length > _LONGEST_STEP
+            if self._is_left_to_sumo:
+                return
         self._put_back()
-        if self._step == 0:
-            names: Iterable[str] = self._sumo.vehicle.getIDList()
-        elif self._departed_number():
-            names = self._departed()
-        else:
-            names = ()
         due = [name for name in names if only is None or name in only]
-        for name in (*due, *self._due.pop(self._step, ())):
+        for name in (*due, *self._looks.take_due()):
             with suppress(*self._errors):  # it has arrived
                 self._look_at(name, is_moved=name in moved, is_placed=name in placed)
 
     def forget(self) -> None:
         """Put all where they are, before the state is saved; those in the middle are left alone."""
-        if self._step < 0 or self._is_left_to_sumo:
+        if self._is_left_to_sumo is not False:
             return
         self._put_back()
-        waiting = [name for names in self._due.values() for name in names]
-        self._due.clear()
-        self._due[self._step + 1] = waiting
+        self._looks.plan_all_now()
 
     def _put_back(self) -> None:
         """Put back who did not do in the last step what was likely; changes of lane go on."""
@@ -132,17 +121,16 @@ class LateralPlaces:
         vehicle = self._sumo.vehicle
         lane = vehicle.getLaneID(name)
         if is_placed or not lane:
-            self._plan_look(name, self._step_length)
+            self._plan_look(name, self._looks.step_length)
             return
         width, gains = vehicle.getWidth(name), vehicle.getAccel(name)
-        speed, seconds = vehicle.getSpeed(name), self._step_length
+        speed, seconds = vehicle.getSpeed(name), self._looks.step_length
         rest = self._size_of(lane)[0] - vehicle.getLanePosition(name)
         if is_moved and (speed + _LARGEST_GAIN * seconds) * seconds < rest:
             self._plan_look(name, seconds)
             return
         if not is_moved and (speed + gains * seconds) * seconds < rest:
-            reaching = (math.sqrt(speed * speed + 2.0 * gains * rest) - speed) / gains
-            self._plan_look(name, reaching)
+            self._plan_look(name, seconds_to(rest, speed, gains))
             return
         likely = speed + vehicle.getAcceleration(name) * seconds
         if not is_moved:
@@ -159,9 +147,7 @@ class LateralPlaces:
         self._plan_look(name, seconds)
 
     def _plan_look(self, name: str, seconds: float) -> None:
-        """Look again one step before so many seconds have passed, or in the next step."""
-        steps = max(1, int(min(seconds, _LONGEST_WAIT) / self._step_length) - 1)
-        self._due.setdefault(self._step + steps, []).append(name)
+        self._looks.plan(name, min(seconds, _LONGEST_WAIT))
 
     def _scale_offset(self, beside: float, width: float, lane: str, entered: str) -> float:
         """What SUMO makes of metres beside the centre of a lane where another one is entered."""
@@ -175,24 +161,12 @@ class LateralPlaces:
 
     def _find_lane(self, name: str, lane: str, beyond: float) -> str | None:
         """The lane that is ``beyond`` metres behind the end of one, on the way of a vehicle."""
-        edges: Iterable[str] | None = None
-        while True:
-            links = self._lanes.links_of[lane]
-            if lane not in self._lanes.internal:
-                if edges is None:
-                    vehicle = self._sumo.vehicle
-                    index = max(0, vehicle.getRouteIndex(name))
-                    edges = iter(vehicle.getRoute(name)[index + 1 :])
-                onto = next(iter(edges), None)
-                edge_of = self._sumo.lane.getEdgeID
-                links = tuple(link for link in links if edge_of(link[0]) == onto)
-            if not links:
-                return None
-            lane = links[0][4] or links[0][0]
-            length = self._size_of(lane)[0]
+        for ahead in self._lanes.ahead(name, lane):
+            length = self._size_of(ahead)[0]
             if beyond < length:
-                return lane
+                return ahead
             beyond -= length
+        return None
 
     def _size_of(self, lane: str) -> tuple[float, float]:
         """Length and width of a lane, m."""

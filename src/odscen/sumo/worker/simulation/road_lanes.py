@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from odscen.sumo.worker.detours import LaneLink
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 _CLASSES = ("passenger", "delivery", "truck", "bus", "motorcycle", "bicycle")
 """SUMO's classes of our categories of vehicles."""
@@ -45,6 +48,22 @@ class RoadLanes:
         """Whether vehicles of a class of SUMO's may use a lane."""
         allowed = self._sumo.lane.getAllowed(lane)
         return not allowed or kind in allowed
+
+    def ahead(self, vehicle: str, lane: str) -> Iterator[str]:
+        """Lanes that a vehicle on a lane comes to on its route, those inside junctions too."""
+        of, edge_of = self._sumo.vehicle, self._sumo.lane.getEdgeID
+        edges: Iterator[str] | None = None
+        while True:
+            links = self.links_of[lane]
+            if lane not in self.internal:
+                if edges is None:
+                    edges = iter(of.getRoute(vehicle)[max(0, of.getRouteIndex(vehicle)) + 1 :])
+                onto = next(edges, None)
+                links = tuple(link for link in links if edge_of(link[0]) == onto)
+            if not links:
+                return
+            lane = links[0][4] or links[0][0]
+            yield lane
 
     def onwards(self, lane: str, kind: str) -> list[tuple[str, str]]:
         """Lanes that a lane leads to and vehicles of a class may enter now, with their edges."""

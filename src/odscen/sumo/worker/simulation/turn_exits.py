@@ -18,9 +18,10 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.sumo.worker.simulation.foreign_traffic import is_foreign
+from odscen.sumo.worker.simulation.planned_looks import PlannedLooks, seconds_to
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
     from odscen.sumo.worker.simulation.road_lanes import RoadLanes
 
@@ -78,11 +79,7 @@ class TurnExits:
         self._route_of, self._route_name_of, self._index_of = (
             native("vehicle", f"getRoute{what}") for what in ("", "ID", "Index")
         )
-        self._departed_number, self._departed = (
-            native("simulation", f"getDeparted{what}") for what in ("Number", "IDList")
-        )
-        self._step, self._step_length = -1, 0.0
-        self._due: dict[int, list[str]] = {}
+        self._looks = PlannedLooks(sumo, native)
         self._waits: dict[str, str] = {}
         self._routes: dict[str, _Route] = {}
         self._leaps: dict[tuple[str, str], bool] = {}
@@ -99,17 +96,9 @@ class TurnExits:
         moved
             Who is driven by something else.
         """
-        if self._step < 0:
-            self._step_length = float(self._sumo.simulation.getDeltaT())
-        self._step += 1
-        if self._step == 0:
-            names: Iterable[str] = self._sumo.vehicle.getIDList()
-        elif self._departed_number():
-            names = self._departed()
-        else:
-            names = ()
+        names = self._looks.next_step()
         new = [n for n in names if not is_foreign(n) and (only is None or n in only)]
-        for name in (*new, *self._due.pop(self._step, ())):
+        for name in (*new, *self._looks.take_due()):
             try:
                 self._look_at(name, is_moved=name in moved)
             except self._errors:  # it has arrived
@@ -117,19 +106,12 @@ class TurnExits:
 
     def forget(self) -> None:
         """Let all change lanes again, before the state is saved."""
-        waiting = [name for names in self._due.values() for name in names]
         for name in sorted(self._waits):
             with suppress(*self._errors):
-                self._release(name)
-        self._due.clear()
-        self._due[self._step + 1] = waiting
+                self._release_vehicle(name)
+        self._looks.plan_all_now()
 
-    def _plan_look(self, name: str, seconds: float) -> None:
-        """Look again when so many seconds have passed, a step early, or in the next step."""
-        steps = max(1, int(seconds / self._step_length) - 1)
-        self._due.setdefault(self._step + steps, []).append(name)
-
-    def _release(self, name: str) -> None:
+    def _release_vehicle(self, name: str) -> None:
         vehicle = self._sumo.vehicle
         del self._waits[name]
         if vehicle.getLaneChangeMode(name) == _WAITING:  # a rule may have said otherwise
@@ -139,44 +121,44 @@ class TurnExits:
         """Have a vehicle wait or not, and say when it may be otherwise, at the earliest."""
         lane, vehicle = self._lane_of(name), self._sumo.vehicle
         if not lane:  # it is being teleported
-            self._plan_look(name, 1.0)
+            self._looks.plan(name, 1.0)
             return
         position, gains = self._position_of(name), vehicle.getAccel(name)
         if name in self._waits:
             if lane in self._lanes.internal:
-                self._plan_look(name, 0.0)
+                self._looks.plan(name, 0.0)
                 return
             room = _SHARE * self._sumo.lane.getLength(lane)
             rest = min(vehicle.getLength(name), room) - position
             if rest > 0.0 and self._sumo.lane.getEdgeID(lane) == self._waits[name]:
-                self._plan_look(name, _seconds_to(rest, self._speed_of(name), gains))
+                self._looks.plan(name, seconds_to(rest, self._speed_of(name), gains))
                 return
-            self._release(name)
+            self._release_vehicle(name)
         route, index = self._route_named(name), self._index_of(name)
         number = bisect_left(route.places, index)
         if number == len(route.places):
-            self._plan_look(name, _LOOK_AGAIN)
+            self._looks.plan(name, _LOOK_AGAIN)
             return
         place, speed = route.places[number], self._speed_of(name)
         if lane in self._lanes.internal:
             if place > index:
-                self._plan_look(name, 0.0)
+                self._looks.plan(name, 0.0)
                 return
             rest = 0.0
         else:
             rest = route.metres[place] - (route.metres[index - 1] if index > 0 else 0.0) - position
-        soon = (speed + gains * self._step_length) * self._step_length
-        if rest > soon + gains * self._step_length**2:
-            self._plan_look(name, min(_LOOK_AGAIN, _seconds_to(rest - soon, speed, gains)))
+        soon = (speed + gains * self._looks.step_length) * self._looks.step_length
+        if rest > soon + gains * self._looks.step_length**2:
+            self._looks.plan(name, min(_LOOK_AGAIN, seconds_to(rest - soon, speed, gains)))
             return
         onto = route.onto[number]
         # Who is on a lane that does not lead there has to change before the turn.
-        if not is_moved and (lane in self._lanes.internal or self._leads(lane, onto)):
+        if not is_moved and (lane in self._lanes.internal or self._leads_onto(lane, onto)):
             vehicle.setLaneChangeMode(name, _WAITING)
             self._waits[name] = onto
-        self._plan_look(name, 0.0)
+        self._looks.plan(name, 0.0)
 
-    def _leads(self, lane: str, onto: str) -> bool:
+    def _leads_onto(self, lane: str, onto: str) -> bool:
         edge_of = self._sumo.lane.getEdgeID
         return any(edge_of(link[0]) == onto for link in self._lanes.links_of[lane])
 
@@ -241,8 +223,3 @@ def _bend_at_end(path: Sequence[tuple[float, ...]], onto: Sequence[tuple[float, 
     chord = math.atan2(path[-1][1] - begin[1], path[-1][0] - begin[0])
     ahead = math.atan2(onto[1][1] - onto[0][1], onto[1][0] - onto[0][0])
     return abs(math.remainder(ahead - chord, math.tau))
-
-
-def _seconds_to(metres: float, speed: float, gains: float) -> float:
-    """Seconds in which a vehicle that gains speed all the time drives so many metres."""
-    return (math.sqrt(speed * speed + 2.0 * gains * max(metres, 0.0)) - speed) / gains
