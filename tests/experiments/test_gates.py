@@ -129,6 +129,8 @@ def test_a_tolerance_of_the_suite_lets_it_pass(store, suite):
     (line,) = lines(case(result, "signal_crossing"))
     words = "changed since the baseline: the scenario's signals (signals, junction 10001: {"
     assert line.startswith(words)
+    start = r", which starts on segment r\d at \d+ s$"
+    assert re.search(rf"; most at actor \S+: travel_time is .*{start}", line)
 
 
 @pytest.mark.slow

@@ -37,11 +37,13 @@ from odscen.experiments.tolerance import FEWEST_SEEDS, size_of
 from odscen.experiments.verdict import (
     VERSIONS,
     Cause,
+    Effect,
     causes_between,
     hold_against,
     likeliest_first,
 )
 from odscen.experiments.work import LocalExecutor
+from odscen.lanegraph.query import segment_of_node
 from odscen.opendrive.parse import parse
 from odscen.opendrive.parse_rules import MAX_BYTES
 from odscen.scenario.document.json_form import dumps, loads
@@ -60,7 +62,7 @@ if TYPE_CHECKING:
     from odscen.experiments.suite import Case, Suite
     from odscen.experiments.suite_runs import RunCase, UnusableCase
     from odscen.experiments.tolerance import Detection
-    from odscen.experiments.verdict import Change
+    from odscen.experiments.verdict import BaselineVerdict, Change
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.opendrive.road_model import OpenDrive
@@ -502,6 +504,7 @@ def _hold_case(
         result,
         causes=causes,
         verdict=verdict,
+        place=_describe_place(verdict, loaded.run),
         failures=tuple(failures),
         map_changes=changes or (),
         scenario_changes=fields,
@@ -518,6 +521,30 @@ def _hold_case(
             *(change.words for change in (changes or ())[:_MAP_CHANGES]),
         ),
     )
+
+
+def _describe_place(verdict: BaselineVerdict, run: CheckedRun) -> str:
+    """Where figures have changed most, beyond their tolerance if any is.
+
+    Pedestrians have no figures of places: where actors alone differ, and none by more than is
+    allowed, the first to depart leads to the reason.
+    """
+    most = verdict.where
+    if most is None:
+        return ""
+    actors = {actor.id: actor for actor in run.scenario.actors}
+    word = "most"
+    if most.effect is Effect.ALLOWED:
+        if most.key.kind == "actor":
+            word = "first"
+            known = [change for change in verdict.allowed if change.key.place in actors]
+            most = min(known, key=lambda change: actors[change.key.place].depart, default=most)
+        word += ", within what is allowed,"
+    start = ""
+    if most.key.kind == "actor" and (actor := actors.get(most.key.place)) is not None:
+        segment = segment_of_node(run.map.sumo.graph, actor.spawn)
+        start = f", which starts on segment {segment} at {actor.depart:g} s"
+    return f"{word} at {most.words}{start}"
 
 
 def _forbidden_changes(

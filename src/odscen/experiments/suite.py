@@ -481,6 +481,8 @@ class CaseResult:
         without a baseline.
     verdict
         Against the baseline; ``None`` without one.
+    place
+        Where figures have changed most, in words; empty without a baseline, or if nothing has.
     errors, failures, missing, new
         The reasons for a status, in words, the worst first.
     error_code
@@ -505,6 +507,7 @@ class CaseResult:
     baseline: Baseline | None = None
     causes: tuple[Cause, ...] = ()
     verdict: BaselineVerdict | None = None
+    place: str = ""
     errors: tuple[str, ...] = ()
     failures: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()

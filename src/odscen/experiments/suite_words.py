@@ -26,8 +26,8 @@ _IN_HEADLINE = 2
 """Figures of the run in the headline; a place comes after them."""
 
 
-NOWHERE = "no place has changed by more than is allowed"
-"""Said where inputs or figures of the run fail and no segment, junction or actor does."""
+NOWHERE = "nothing has changed at any segment, junction or actor"
+"""Said where inputs or figures of the run fail, and figures of all places are as they were."""
 
 
 def headline(case: CaseResult) -> str:
@@ -46,7 +46,7 @@ def headline(case: CaseResult) -> str:
     return "; ".join(
         [
             *_describe_better(case)[:_IN_HEADLINE],
-            *([why] if (why := _describe_changed_inputs(case)) else []),
+            *filter(None, [_describe_changed_inputs(case), case.place]),
         ]
     )
 
@@ -75,9 +75,8 @@ def _describe_worst(case: CaseResult) -> list[str]:
     found = [words for words in case.failures if words not in changes][:1]
     failing = [change for change in verdict.figures if change.counts]  # the strongest first
     found += [change.words for change in failing[:_IN_HEADLINE]]
-    place = verdict.where
-    if place is not None:
-        return [*found, f"most at {place.words}" if found else place.words]
+    if case.place:
+        return [*found, case.place]
     return [*found, NOWHERE] if case.causes else found
 
 
@@ -125,10 +124,12 @@ def where(case: CaseResult) -> str | None:
 
 def details(case: CaseResult) -> list[str]:
     """All there is to say of a scenario below its headline, one line each."""
+    top = headline(case)
     found = [*case.problems, *_describe_better(case)]
     found += [text for text in (where(case), reason(case)) if text]
     found += [f"warning: {words}" for words in case.warnings]
-    return list(dict.fromkeys(text for text in (*found, *case.notes) if text != headline(case)))
+    told = (top, _describe_changed_inputs(case) if case.status.passes else top)
+    return list(dict.fromkeys(text for text in (*found, *case.notes) if text not in told))
 
 
 def lines(case: CaseResult) -> list[str]:

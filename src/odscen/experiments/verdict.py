@@ -39,6 +39,7 @@ class Effect(StrEnum):
     BETTER = "better"
     FEW = "too few vehicles to fail"
     EXPLAINS = "explains"
+    ALLOWED = "within what is allowed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +109,15 @@ class BaselineVerdict:
         Segments and junctions, those that fail the gate first, the most changed before others.
     actors
         The most changed first; they explain, and fail only where the suite gives a tolerance.
+    allowed
+        Segments and junctions, then actors, that have changed within their tolerance, the most
+        changed first.
     """
 
     figures: tuple[Change, ...]
     places: tuple[Change, ...]
     actors: tuple[Change, ...]
+    allowed: tuple[Change, ...]
 
     @property
     def failing(self) -> tuple[Change, ...]:
@@ -130,8 +135,11 @@ class BaselineVerdict:
 
     @property
     def where(self) -> Change | None:
-        """The place that has changed most, else the actor; ``None`` if all are as they were."""
-        return next(iter((*self.places, *self.actors)), None)
+        """The place that has changed most, else the actor; ``None`` if all are as they were.
+
+        Those beyond their tolerance go before others.
+        """
+        return next(iter((*self.places, *self.actors, *self.allowed)), None)
 
 
 def hold_against(
@@ -170,12 +178,18 @@ def hold_against(
                 change = replace(change, effect=Effect.FAILS)
             changes.append(change)
 
-    def of(*kinds: str) -> tuple[Change, ...]:
-        chosen = [change for change in changes if change.key.kind in kinds]
+    def of(*kinds: str, allowed: bool = False) -> tuple[Change, ...]:
+        chosen = [
+            change
+            for change in changes
+            if change.key.kind in kinds and allowed == (change.effect is Effect.ALLOWED)
+        ]
         # Sorting is stable: figures of the run that are equally far off stay in their order.
         return tuple(sorted(chosen, key=lambda change: (not change.counts, -change.score)))
 
-    return BaselineVerdict(of("run"), of("segment", "junction"), of("actor"))
+    places = ("segment", "junction")
+    slight = (*of(*places, allowed=True), *of("actor", allowed=True))
+    return BaselineVerdict(of("run"), of(*places), of("actor"), slight)
 
 
 class _ComparedFigure(NamedTuple):
@@ -275,13 +289,15 @@ def _judge_change(
         return Change(key, entry, difference, EXACT, 1.0, Effect.FAILS)
     allowed = tolerance.allowed(difference.a)
     size = abs(difference.b - difference.a)
-    if size <= allowed + _NOISE:
+    if size <= _NOISE:
         return None
     # A mean over n vehicles varies by chance with 1 / sqrt(n). Where none is allowed, one counts.
     score = size / (allowed or 1.0) * math.sqrt(compared.weight)
-    effect = _effect_of(
-        key, tolerances, compared.weight, better=entry.improves(difference.difference)
-    )
+    effect = Effect.ALLOWED
+    if size > allowed + _NOISE:
+        effect = _effect_of(
+            key, tolerances, compared.weight, better=entry.improves(difference.difference)
+        )
     return Change(key, entry, difference, tolerance, score, effect)
 
 

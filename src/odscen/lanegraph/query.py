@@ -163,6 +163,21 @@ def is_walk_node_id(name: str) -> bool:
     return name.startswith(WALK_PREFIX)
 
 
+def segment_of_node(graph: MapGraph, name: str) -> SegmentId:
+    """Segment that a node of the lane graph or of the pedestrian graph lies in.
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such node.
+    """
+    if is_walk_node_id(name):
+        row = graph.walks.segment[walk_node_index(graph, name)]
+    else:
+        row = graph.lanes.segment[node_index(graph, name)]
+    return graph.segments.ids[int(row)]
+
+
 def segment_rows(segments: Segments, ids: Iterable[str]) -> Int32Array:
     """Rows of the segments ``ids``, ascending and without repetitions.
 
