@@ -17,7 +17,7 @@ import odscen
 MAP = "motorway_weave"
 
 
-def reached(lanes: nx.MultiDiGraph, relations: set[str]) -> float:
+def reached(lanes: nx.MultiDiGraph[str], relations: set[str]) -> float:
     """Mean share of all nodes that a vehicle comes to from the start of a segment."""
     edges = [(a, b) for a, b, relation in lanes.edges(keys=True) if relation in relations]
     graph = nx.DiGraph(edges)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import re
 import subprocess
 import sys
@@ -116,6 +117,49 @@ def test_examples_of_the_documents_pass_a_strict_type_checker(tmp_path: Path) ->
         cwd=ROOT, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_examples_pass_pyright(tmp_path: Path) -> None:
+    """By basedpyright, which has Node with it, with the strict rules of Pyright."""
+    pytest.importorskip("basedpyright")
+    settings = {
+        "include": [str(ROOT / "examples")],
+        "typeCheckingMode": "standard",
+        "reportMissingTypeArgument": True,
+        "reportPrivateUsage": True,
+        "reportUnnecessaryTypeIgnoreComment": True,
+    }
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
+    command = [sys.executable, "-m", "basedpyright", "--project", str(tmp_path)]
+    done = subprocess.run(
+        [*command, "--pythonpath", sys.executable, "--level", "error"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_examples_import_public_modules_only() -> None:
+    """``odscen`` and what it names: none that may change without notice."""
+    public = {"odscen", *(f"odscen.{module}" for module in odscen.MODULES)}
+    scripts = sorted((ROOT / "examples").glob("*.py"))
+    assert len(scripts) >= 10
+    for script in scripts:
+        tree = ast.parse(script.read_text(encoding="utf-8"))
+        modules = {
+            name
+            for node in ast.walk(tree)
+            for name in (
+                [node.module or ""]
+                if isinstance(node, ast.ImportFrom)
+                else [alias.name for alias in node.names]
+                if isinstance(node, ast.Import)
+                else []
+            )
+            if name.partition(".")[0] == "odscen"
+        }
+        assert modules, script.name
+        assert modules <= public, script.name
 
 
 def test_an_unknown_name_is_an_attribute_error_as_of_any_module() -> None:

@@ -120,7 +120,7 @@ class CalmTraffic(Simulator[CalmRun]):
     def __init__(self, headway: float = 1.5) -> None:
         self.headway = headway
 
-    def unsupported(self, scenario: Scenario, on: SimulatedMap) -> Iterator[Problem]:  # type: ignore[override]
+    def unsupported(self, scenario: Scenario, on: SimulatedMap) -> Iterator[Problem]:
         """List what it leaves out."""
         del on
         words = "sees no light, sign, right of way or merge: where ways meet, bodies may overlap"

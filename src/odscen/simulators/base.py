@@ -18,7 +18,7 @@ from odscen.base.errors import InputError
 from odscen.runs.new_run import PreparedRun
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     from odscen.base.arrays import FloatArray
@@ -140,7 +140,7 @@ class Simulator(ABC, Generic[Prepared]):
     versions: Mapping[str, str] = {}
     """What ``summary.json`` says of it under ``versions``."""
 
-    def unsupported(self, scenario: Scenario, on: SimulatedMap) -> Sequence[Problem]:
+    def unsupported(self, scenario: Scenario, on: SimulatedMap) -> Iterable[Problem]:
         """List what it does not do of a scenario; with an error among it, none is run."""
         del scenario, on
         return ()
