@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,14 @@ from odscen.sumo.realize.signals_ahead import lights_at, lights_at_start
 CROSSING = "signal_crossing"
 MAPS = Path(__file__).parents[3] / "maps"
 SHORT = DataSettings(runs=2, density=(8.0, 12.0), warm_up=30.0, duration=60.0, snapshots=3)
+
+
+SHORT_ROAD = """<OpenDRIVE><header revMajor="1" revMinor="6"/>
+<road id="1" length="10" junction="-1">
+<planView><geometry s="0" x="0" y="0" hdg="0" length="10"><line/></geometry></planView>
+<lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
+<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+</right></laneSection></lanes></road></OpenDRIVE>"""
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +96,15 @@ def test_snapshots_are_made_once(workspace: Workspace, shards: Path) -> None:
     before = {file: file.stat().st_mtime_ns for file in shards.iterdir()}
     make_shards(workspace, [CROSSING], shards, settings=SHORT)
     assert {file: file.stat().st_mtime_ns for file in shards.iterdir()} == before
+
+
+def test_a_map_without_room_for_traffic_is_left_out_with_its_reason(tmp_path: Path) -> None:
+    """A road of 20 m; others of the same command are made all the same."""
+    store = Workspace.open(tmp_path / "workspace")
+    (tmp_path / "short.xodr").write_text(SHORT_ROAD)
+    store.add_map(tmp_path / "short.xodr")
+    (made,) = make_shards(store, ["short"], tmp_path / "shards", settings=replace(SHORT, runs=1))
+    assert (made.vehicles, made.skipped) == (0, "no vehicle came onto the map")
 
 
 @pytest.mark.slow(together=True)

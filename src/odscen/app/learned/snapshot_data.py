@@ -322,6 +322,8 @@ def _judge_run(
     """Why a run is left out, or its snapshots."""
     if run.exit_code == 3:
         return f"the run has failed: {run.known.get('error')}", ()
+    if run.counts["inserted"] == 0:
+        return "no vehicle came onto the map", ()
     bad = [
         reason["words"]
         for reason in run.usability.get("reasons", ())
