@@ -251,7 +251,7 @@ def _filled(user: OdscenPage) -> None:
     """From the click that fills the region until all are shown, and what is said meanwhile."""
     page = user.page
     user.step("Road users").click()
-    page.get_by_role("button", name="Fill the whole region").click()
+    page.get_by_role("button", name="Generate traffic").click()
     density = page.get_by_role("slider", name="Density, percent of the maximum")
     density.press("End")
     for _ in range((100 - DENSITY) // SLIDER_STEP):

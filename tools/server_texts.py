@@ -1,4 +1,4 @@
-"""The texts of the closed lists of the server, for the catalogue: figures, verdicts, templates.
+"""The texts of the closed lists of the server, for the catalogue: figures, templates, models.
 
 The page looks a text up as the server sends it; what is not here is shown in English.
 """
@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from odscen.app.generators import installed_generators
-from odscen.figures.measures.usability import UsabilityLevel
 from odscen.scenario.templates.template_registry import TEMPLATES
 from odscen.sumo.worker.behaviour.behaviour_doors import installed_behaviours
 from odscen.web.routes.figure_routes import actor_measures, figures
@@ -46,11 +45,10 @@ def _registered() -> Iterator[str]:
             yield figure.definition
     for measure in actor_measures():
         yield measure.label
-    yield from (str(level) for level in UsabilityLevel)
     for template in TEMPLATES.values():
         yield from (template.title, template.summary, template.needs)
         for number in template.parameters:
-            yield number.meaning
+            yield from (number.title, number.meaning)
     for one in (*installed_generators(), *installed_behaviours()):
         yield one.summary
         for option in one.options:

@@ -147,7 +147,7 @@ test("only free and usable places of the region are offered, of the right kind",
 
 test("a road user that cannot start somewhere comes with the reason", () => {
   expect(startsOf(scenario([]), 2).reasonAt(4, 0, 1, false, "bicycle")).toContain(
-    "No bicycle may start here",
+    "No bicycle may start on this lane",
   );
   expect(startsOf(scenario([]), 2).reasonAt(0, 9, 1, true, "pedestrian")).toContain("outside the region");
   expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("occupied");

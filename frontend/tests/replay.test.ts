@@ -98,9 +98,9 @@ test("incidents are reported in words and marked from when they happen", () => {
 test("every kind of event is a sentence with a subject and has a mark of its own", () => {
   const begun: Incident = { time: 2, kind: "rule_started", actor: "van-1", rule: "cut-in", values: {} };
   const about = (values: Record<string, number>) => sentence({ ...begun, values }, new Map());
-  expect(about({ ttc: 3 })).toBe("van-1 began rule cut-in (time to collision 3.0 s)");
+  expect(about({ ttc: 3 })).toBe("van-1 triggered rule cut-in (time to collision 3.0 s)");
   expect(about({ "all[0].speed": 10, "all[1].time": 2, "all[2].reaches": 4.2 })).toBe(
-    "van-1 began rule cut-in (speed 36 km/h, distance 4.2 m)",
+    "van-1 triggered rule cut-in (speed 36 km/h, distance 4.2 m)",
   );
   const jam: Incident = { time: 60, kind: "jam_begin", actor: "car-1", queue: 7, x: 1, y: 2 };
   const over: Incident = { time: 400, kind: "jam_end", actor: "", waited: 340 };

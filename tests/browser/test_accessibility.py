@@ -281,14 +281,14 @@ def test_an_open_form_of_a_rule(
     user.choose("Condition", "Any of several holds")
     user.page.get_by_role("button", name="Add a condition").click()
     user.page.get_by_role("button", name="When it counts").first.click()
-    user.choose("Condition 2", "Something does not hold")
+    user.choose("Condition 2", "Not (negation)")
     user.choose("Action", "Follow a path")
     for point in ("0, 5", "8, 20"):
         user.page.get_by_label("Points: one more", exact=True).fill(point)
         user.page.keyboard.press("Enter")
     user.choose("How fast", "A speed at each point")
-    user.page.get_by_role("button", name="Then another action").click()
-    user.page.get_by_role("button", name="At the same time as action 2").click()
+    user.page.get_by_role("button", name="Add next action").click()
+    user.page.get_by_role("button", name="Add parallel action to action 2").click()
     user.choose("Action 2, part 2", "Set its lights")
     inspector.look("editor-rule-form")
     with user.changing():
@@ -357,7 +357,7 @@ def test_a_long_run(visit: Callable[..., Any], served: tool.Served, sampled: str
     user.run.click()
     user.wait_until_moving()
     inspector.look("run-long")
-    user.control("Resume later").click()
+    user.control("Pause and save").click()
     expect(user.result).to_contain_text("interrupted")
     inspector.look("run-interrupted")
 

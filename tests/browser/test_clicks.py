@@ -182,7 +182,7 @@ def make_story(user: OdscenPage, hand: Hand) -> None:
     hand.press(user.new_scenario(CROSSING))
     user.wait_for_editor()
     with user.changing():
-        hand.press(page.get_by_role("button", name="Take the whole map"))
+        hand.press(page.get_by_role("button", name="Select whole map"))
     hand.press(user.step("Road users"))
     far = node_near(user, 80.0, 7.9, walking=True)
     here = node_near(user, 80.0, -7.9, walking=True)

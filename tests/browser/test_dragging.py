@@ -205,7 +205,7 @@ def test_three_cars_a_pedestrian_and_an_ego_with_a_goal_run_within_eighteen_clic
     user.wait_for_editor()
     user.close_tour()
     with user.changing():
-        user.page.get_by_role("button", name="Take the whole map").click()
+        user.page.get_by_role("button", name="Select whole map").click()
     user.step("Road users").click()
     roi = user.document()["roi"]
     starts = user.graph.starts(roi, 6, apart=20)[3:]

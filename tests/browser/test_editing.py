@@ -77,7 +77,7 @@ def test_a_region_never_falls_apart(region: OdscenPage) -> None:
 @pytest.mark.slow
 def test_the_whole_map_is_one_click_and_one_step_of_undo(editor: OdscenPage) -> None:
     with editor.changing():
-        editor.page.get_by_role("button", name="Take the whole map").click()
+        editor.page.get_by_role("button", name="Select whole map").click()
     assert sorted(editor.document()["roi"]) == sorted(one["id"] for one in editor.graph.segments)
     with editor.changing():
         editor.undo.click()
@@ -96,7 +96,7 @@ def test_a_rectangle_and_what_is_in_sight_become_the_region(editor: OdscenPage) 
     keyboard.up("Shift")
     assert editor.document()["roi"] == [junction]
     with editor.changing():
-        editor.page.get_by_role("button", name="Take all that I see").click()
+        editor.page.get_by_role("button", name="Select visible area").click()
     assert len(editor.document()["roi"]) == len(graph.segments)
 
 
@@ -266,7 +266,7 @@ def test_a_flow_is_placed_and_undone(region: OdscenPage) -> None:
 @pytest.mark.slow
 def test_a_random_crowd_fills_the_region_in_one_step(region: OdscenPage) -> None:
     region.step("Road users").click()
-    region.page.get_by_role("button", name="Fill the whole region").click()
+    region.page.get_by_role("button", name="Generate traffic").click()
     settle(region.page)
     button = region.page.get_by_role("button", name="Fill the region", exact=True)
     with region.changing():

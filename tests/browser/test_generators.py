@@ -40,7 +40,7 @@ def filling(open_page: Callable[..., OdscenPage], served: tool.Served) -> Odscen
     user = open_page(served.url)
     user.open_editor(path.name.removesuffix(SUFFIX))
     user.step("Road users").click()
-    user.page.get_by_role("button", name="Fill the whole region").click()
+    user.page.get_by_role("button", name="Generate traffic").click()
     return user
 
 

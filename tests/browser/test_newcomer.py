@@ -127,9 +127,9 @@ def test_a_newcomer_gets_from_an_osm_file_of_his_town_to_a_run_within_twenty_cli
         user.wait_for_editor()
         user.close_tour()
         with user.changing():
-            user.page.get_by_role("button", name="Take the whole map").click()
+            user.page.get_by_role("button", name="Select whole map").click()
         user.step("Road users").click()
-        user.page.get_by_role("button", name="Fill the whole region").click()
+        user.page.get_by_role("button", name="Generate traffic").click()
         with user.changing():
             user.page.get_by_role("button", name="Fill the region", exact=True).click()
         assert len(user.document()["actors"]) >= 5

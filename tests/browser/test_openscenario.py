@@ -64,7 +64,7 @@ def test_a_dropped_scene_is_reported_edited_and_exported(
     expect(side).to_contain_text("2 road users and")
     expect(side).to_contain_text("road, which was added to your maps")
     sections = [one.get_attribute("aria-label") for one in side.locator("section").all()]
-    assert sections[0] == "Left out, though it would act"
+    assert sections[0] == "Not supported (affects behaviour)"
     assert sections[-1] == "Imported unchanged"
     place = side.get_by_role("region", name=sections[0]).get_by_role("button").first
     place.click()

@@ -159,7 +159,7 @@ def run_until_fired(user: OdscenPage, hand: Hand, actor: str) -> None:
     expect(user.result).to_contain_text("finished", timeout=90_000)
     hand.open_tab("Incidents")
     fired = user.page.get_by_role("list", name="Incidents").get_by_role("button")
-    words = re.compile(rf"{actor} began rule rule-1(?!-wait)")
+    words = re.compile(rf"{actor} triggered rule rule-1(?!-wait)")
     expect(fired.filter(has_text=words)).to_have_count(1)
 
 

@@ -31,6 +31,15 @@ def test_all_steps_and_run_are_in_sight_and_one_click_runs(user: OdscenPage, sam
     user.wait_until_moving()
 
 
+@pytest.mark.slow
+def test_next_leads_from_step_to_step_and_never_past_one(user: OdscenPage, sampled: str) -> None:
+    user.open_editor(sampled)
+    user.step("Region").click()
+    for title in ("Weather and time", "Road users", "Demand", "Public transport"):
+        user.page.get_by_role("button", name=f"Next: {title.lower()}").click()
+        expect(user.step(title)).to_have_attribute("aria-expanded", "true")
+
+
 def test_a_click_on_a_signal_in_the_step_of_the_region_keeps_its_junction(
     user: OdscenPage, sampled: str
 ) -> None:
@@ -53,7 +62,7 @@ def test_run_says_what_hinders_it(user: OdscenPage) -> None:
     expect(user.page.get_by_text("Choose the region first: click a road")).to_be_visible()
     expect(user.step("Region")).to_have_attribute("aria-expanded", "true")
     with user.changing():
-        user.page.get_by_role("button", name="Take the whole map").click()
+        user.page.get_by_role("button", name="Select whole map").click()
     run_of_head(user).click()
     expect(user.page.get_by_text("There are no road users yet: choose a kind")).to_be_visible()
     expect(user.step("Road users")).to_have_attribute("aria-expanded", "true")

@@ -99,7 +99,7 @@ def make_story(user: OdscenPage, name: str) -> None:
     add_rule(user)
     begin_rule(user, hand, "cut-in", "van-1")
     hand.write("Duration", "2")
-    page.get_by_role("button", name="At the same time as action").click()
+    page.get_by_role("button", name="Add parallel action to action").click()
     user.choose("Action, part 2", "Reach a speed")
     page.get_by_label("Speed", exact=True).fill("32.4")
     page.keyboard.press("Enter")

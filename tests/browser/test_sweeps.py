@@ -41,7 +41,7 @@ def test_a_number_becomes_a_slider_is_swept_and_a_case_opened_by_a_click(
     user.open_editor(two)
     user.step("Parameters").click()
     first = user.document()["actors"][0]["id"]
-    page.get_by_role("textbox", name="Number that becomes a parameter").click()
+    page.get_by_role("textbox", name="Value to vary").click()
     page.get_by_role("option", name=f"{first}: depart, now 0").click()
     page.get_by_label("Name of the parameter").fill("later")
     page.get_by_label("Unit", exact=True).fill("s")

@@ -27,7 +27,7 @@ def test_a_newcomer_places_the_walker_by_mouse(
     dialog = page.get_by_role("dialog", name="Pedestrian mid-block")
     dialog.get_by_label("Map").first.click()
     page.get_by_role("option", name="signal_crossing").click()
-    dialog.get_by_role("button", name="Place it").click()
+    dialog.get_by_role("button", name="Create scenario").click()
     user.wait_for_editor()
     document = user.document()
     assert [rule["id"] for rule in document["rules"]] == ["wait", "cross"]
@@ -50,12 +50,12 @@ def test_a_template_is_placed_by_keyboard_and_says_why_it_has_no_room(
     page.keyboard.type("signal_crossing")
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")
-    button = dialog.get_by_role("button", name="Place it")
+    button = dialog.get_by_role("button", name="Create scenario")
     button.focus()
     page.keyboard.press("Enter")
     alert = dialog.get_by_role("alert")
     expect(alert).to_contain_text("has no room for a cut-in", timeout=PATIENCE)
-    for name, value in (("ego speed", "28.8"), ("speed", "14.4")):
+    for name, value in (("Ego speed", "28.8"), ("Cut-in vehicle speed", "14.4")):
         number = dialog.get_by_role("textbox", name=f"{name} (km/h)", exact=True)
         number.focus()
         page.keyboard.press("Control+a")

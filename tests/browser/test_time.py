@@ -124,7 +124,7 @@ def test_the_bar_of_a_replay_jumps_to_the_instants_of_its_events(
     bar = user.time_bar
     bar.get_by_role("button", name="Next event").click()
     expect(bar.get_by_role("status")).to_contain_text("0:05.0")
-    expect(bar.get_by_role("status")).to_contain_text("began rule halts")
+    expect(bar.get_by_role("status")).to_contain_text("triggered rule halts")
     assert float(slider.input_value()) == pytest.approx(5.0, abs=0.3)
     expect(bar.get_by_text("Light 10001")).to_be_visible()
     axis = bar.locator(".time-axis").bounding_box()

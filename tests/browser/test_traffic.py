@@ -57,11 +57,11 @@ def test_vehicles_from_outside_are_added_where_lanes_lead_in(
     user: OdscenPage, crossing: str
 ) -> None:
     open_traffic(user, crossing)
-    user.page.get_by_role("button", name="Add vehicles from outside").click()
+    user.page.get_by_role("button", name="Add vehicle inputs").click()
     user.choose("Where they drive in", "r2, 2 lanes")
     with user.changing():
         user.page.get_by_role("button", name="Add", exact=True).click()
-    card = user.page.get_by_role("region", name="Vehicles from outside input", exact=True)
+    card = user.page.get_by_role("region", name="Vehicle input input", exact=True)
     with user.changing():
         card.get_by_label("Vehicles per hour").fill("950")
         user.page.keyboard.press("Enter")
@@ -221,7 +221,7 @@ def test_a_long_run_is_forecast_interrupted_and_resumed_to_its_end(
     user.page.get_by_role("button", name="Estimate disk and memory").click()
     expect(user.page.get_by_text("of memory")).to_be_visible()
     user.run.click()
-    later = user.strip.get_by_role("button", name="Resume later")
+    later = user.strip.get_by_role("button", name="Pause and save")
     expect(later).to_be_enabled()
     later.click()
     expect(user.result).to_contain_text("interrupted")

@@ -167,10 +167,10 @@ def test_three_sentences_say_what_holds_what_is_worst_and_what_is_next():
         "Next, at East Street / North Street: try another split, cycle or offset.",
     ]
     reason = UsabilityReason(
-        UsabilityKind.GRIDLOCK, UsabilityLevel.NOT_USABLE, 900.0, 1, "jam that did not dissolve"
+        UsabilityKind.GRIDLOCK, UsabilityLevel.NOT_USABLE, 900.0, 1, "unresolved queue"
     )
     broken = traffic_sentences(values, Usability(UsabilityLevel.NOT_USABLE, (reason,)), rows)
-    assert broken[0] == "The results are not valid: jam that did not dissolve."
+    assert broken[0] == "The results are not valid: unresolved queue."
     assert broken[2].startswith("Next: find out why traffic breaks down, first at East Street")
 
 

@@ -17,6 +17,8 @@ def test_templates_are_listed_with_their_numbers(client: TestClient) -> None:
     assert {one["name"] for one in listed[0]["numbers"]} == {
         one.name for one in TEMPLATES["cut-in"].parameters
     }
+    titles = [one["title"] for one in listed[0]["numbers"]]
+    assert titles[1:4] == ["Cut-in vehicle speed", "Time to collision", "Lane-change duration"]
 
 
 def test_a_template_becomes_a_scenario_that_can_be_edited(client: TestClient) -> None:
@@ -41,3 +43,22 @@ def test_a_template_without_room_is_refused_with_the_reasons(client: TestClient)
     assert client.get("/api/scenarios").json() == []
     wish = {"map": CROSSING, "template": "nothing"}
     assert client.post("/api/scenarios", json=wish).status_code == 404
+
+
+def test_maps_say_whether_they_have_room_for_a_template_before_a_scenario_is_made(
+    client: TestClient,
+) -> None:
+    def reason(template: str, **values: float) -> str:
+        asked = {"map": CROSSING, "values": values}
+        answer = client.post(f"/api/templates/{template}/room", json=asked)
+        assert answer.status_code == 200, answer.text
+        return str(answer.json()["reason"])
+
+    assert reason("mid-block") == ""
+    assert "has no room for a cut-in: of " in reason("cut-in")
+    assert reason("cut-in", ego_speed=8.0, speed=4.0) == ""
+    assert client.get("/api/scenarios").json() == []
+    assert client.post("/api/templates/no/room", json={"map": CROSSING}).status_code == 404
+    assert client.post("/api/templates/cut-in/room", json={"map": "none"}).status_code == 404
+    refused = client.post("/api/templates/cut-in/room", json={"map": CROSSING, "values": {"a": 1}})
+    assert refused.status_code == 422

@@ -119,6 +119,6 @@ def interrupted(studio: Studio) -> None:
         user.run.click()
         parts = page.get_by_text(re.compile(r"^\d of \d parts completed"))
         expect(parts).to_be_visible(timeout=PATIENCE)
-        user.control("Resume later").click()
+        user.control("Pause and save").click()
         expect(user.result).to_contain_text("interrupted", timeout=PATIENCE)
         camera.take("interrupted", user.result, margin=8)

@@ -23,7 +23,7 @@ def demand(studio: Studio) -> None:
         user, page = camera.user, camera.user.page
         user.open_editor(scenarios.INFLOW)
         user.step("Demand").click()
-        card = page.get_by_role("region", name="Vehicles from outside west", exact=True)
+        card = page.get_by_role("region", name="Vehicle input west", exact=True)
         card.get_by_role("button", name="Change the mix").click()
         card.evaluate(TO_TOP)
         camera.take("traffic", card)
@@ -71,7 +71,7 @@ def rules(studio: Studio) -> None:
         run_at_once(camera)
         watch_again(camera)
         page.get_by_role("tab", name="Incidents").click()
-        page.get_by_role("button", name="began rule crosses").click()
+        page.get_by_role("button", name="triggered rule crosses").click()
         user.map.area.focus()
         for key in ("ArrowDown", "ArrowRight"):  # from behind the small map
             page.keyboard.press(key)

@@ -717,6 +717,13 @@ export interface paths {
          */
         get: operations["list_templates_api_templates_get"];
     };
+    "/api/templates/{template}/room": {
+        /**
+         * Find Room
+         * @description Whether a map has room for a template, before a scenario is made of it.
+         */
+        post: operations["find_room_api_templates__template__room_post"];
+    };
     "/api/scenarios/{name}/demand/day": {
         /**
          * Day
@@ -2530,7 +2537,7 @@ export interface components {
          *     time
          *         Seconds: since when.
          *     until
-         *         Seconds: until when; ``None`` for a jam that did not dissolve, and if not inserted.
+         *         Seconds: until when; ``None`` for a unresolved queue, and if not inserted.
          *     actor
          *         Who was first in it.
          *     count
@@ -3936,6 +3943,18 @@ export interface components {
             inside: string[];
             candidates: string[];
             removable: string[];
+        };
+        /** @description ``reason`` says why there is no room; it is empty where there is. */
+        RoomAnswer: {
+            reason: string;
+        };
+        /** @description Whether a map has room for a template; ``values`` are numbers that differ from its own. */
+        RoomQuestion: {
+            map: string;
+            /** @default {} */
+            values?: {
+                [key: string]: number;
+            };
         };
         /**
          * @description How trips of inputs, matrices and background traffic choose their routes.
@@ -5578,6 +5597,7 @@ export interface components {
         /** @description A number of a template; ``usual`` ``null`` follows from the others, as ``meaning`` says. */
         TemplateNumber: {
             name: string;
+            title: string;
             usual: number | null;
             low: number;
             high: number;
@@ -7795,6 +7815,27 @@ export interface operations {
             200: {
                 content: {
                     "application/json": components["schemas"]["TemplateInfo"][];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    find_room_api_templates__template__room_post: {
+        parameters: {
+            path: {
+                template: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RoomQuestion"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["RoomAnswer"];
                 };
             };
             default: components["responses"]["Error"];

@@ -1,7 +1,7 @@
 import { Alert, Button, Card, Group, Modal, NumberInput, Select, Stack, Text, Title } from "@mantine/core";
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
-import { useState } from "react";
+import { useEffect, useState } from "react";
 
 import { shownUnit } from "../language/units";
 import { served } from "../language/served";
@@ -67,12 +67,60 @@ export function Templates({ maps }: { maps: MapInfo[] }) {
   );
 }
 
+/** Milliseconds after the last change of a number until maps are asked for room. */
+const CALM = 300;
+
+/**
+ * Why each map has no room for a template with these numbers, empty where it has; asked for one map
+ * after the other, as a large one takes seconds.
+ */
+function useRooms(
+  template: string,
+  maps: readonly MapInfo[],
+  values: Record<string, number>,
+): ReadonlyMap<string, string> {
+  const [rooms, setRooms] = useState<ReadonlyMap<string, string>>(new Map());
+  useEffect(() => {
+    let current = true;
+    setRooms(new Map());
+    const ask = async (): Promise<void> => {
+      for (const { name } of maps) {
+        const reason = await templates.room(template, name, values).catch(() => null);
+        if (!current) return;
+        if (reason !== null) setRooms((known) => new Map(known).set(name, reason));
+      }
+    };
+    const timer = setTimeout(() => void ask(), CALM);
+    return () => {
+      current = false;
+      clearTimeout(timer);
+    };
+  }, [template, maps, values]);
+  return rooms;
+}
+
+/** The maps in groups: those with room first, those that are not known yet, and those without. */
+function mapChoices(
+  maps: readonly MapInfo[],
+  rooms: ReadonlyMap<string, string>,
+): { group: string; items: string[] }[] {
+  const named = (of: (reason: string | undefined) => boolean): string[] =>
+    maps.map(({ name }) => name).filter((name) => of(rooms.get(name)));
+  return [
+    { group: t`With room for it`, items: named((reason) => reason === "") },
+    { group: t`Not checked yet`, items: named((reason) => reason === undefined) },
+    { group: t`Without a suitable location`, items: named((reason) => Boolean(reason)) },
+  ].filter(({ items }) => items.length > 0);
+}
+
 /** Which map, and the numbers of a template. */
 function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
   const [map, setMap] = useState<string | null>(null);
   const [values, setValues] = useState<Record<string, number>>({});
   const [busy, setBusy] = useState(false);
   const [refused, setRefused] = useState<string | null>(null);
+  const rooms = useRooms(template.name, maps, values);
+  const reason = refused ?? (map === null ? "" : (rooms.get(map) ?? ""));
   const place = (): void => {
     if (map === null) return;
     setBusy(true);
@@ -86,6 +134,7 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
     );
   };
   const change = (name: string, value: string | number): void => {
+    setRefused(null);
     const others = Object.fromEntries(Object.entries(values).filter(([other]) => other !== name));
     setValues(typeof value === "number" ? { ...others, [name]: value } : others);
   };
@@ -103,9 +152,12 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
         label={t`Map`}
         placeholder={t`Choose a map`}
         searchable
-        data={maps.map((one) => one.name)}
+        data={mapChoices(maps, rooms)}
         value={map}
-        onChange={setMap}
+        onChange={(next) => {
+          setMap(next);
+          setRefused(null);
+        }}
       />
       <div style={{ display: "grid", gap: 12, gridTemplateColumns: "1fr 1fr", alignItems: "end" }}>
         {template.numbers.map((one) => {
@@ -114,9 +166,9 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
           return (
             <NumberInput
               key={one.name}
-              label={`${one.name.replace(/_/g, " ")} (${sign})`}
+              label={sign ? `${served(one.title)} (${sign})` : served(one.title)}
               description={served(one.meaning)}
-              placeholder={t`by the others`}
+              placeholder={t`calculated`}
               min={bound(one.low)}
               max={bound(one.high)}
               decimalScale={3}
@@ -126,14 +178,14 @@ function Placing({ template, maps }: { template: Template; maps: MapInfo[] }) {
           );
         })}
       </div>
-      {refused && (
-        <Alert color="red" title={t`It cannot be placed`}>
-          {refused}
+      {reason && (
+        <Alert color="red" title={t`No suitable location`}>
+          {reason}
         </Alert>
       )}
       <Group justify="flex-end">
         <Button onClick={place} loading={busy} disabled={map === null}>
-          <Trans>Place it</Trans>
+          <Trans>Create scenario</Trans>
         </Button>
       </Group>
     </Stack>

@@ -178,7 +178,7 @@ export function ActorStep(props: Props) {
         aria-expanded={filling}
         onClick={() => setFilling(!filling)}
       >
-        {filling ? t`Hide the filling` : t`Fill the whole region`}
+        {filling ? t`Hide` : t`Generate traffic`}
       </Button>
       <Collapse in={filling}>
         {filling && <FillForm actors={props.actors} busy={props.filling} onFill={props.onFill} />}

@@ -39,8 +39,8 @@ export function CriteriaStep({
     <>
       <Text size="sm">
         <Trans>
-          What must come out of a run for it to pass. Each is judged when the run has ended, and suites of
-          tests expect it.
+          What must come out of a run for it to pass. Each is judged when the run has ended, and is also
+          checked by regression tests.
         </Trans>
       </Text>
       {criteria.map((text, n) => {

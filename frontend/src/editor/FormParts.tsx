@@ -23,10 +23,10 @@ export function OpenAndShow({
         size="compact-sm"
         variant="default"
         aria-expanded={open}
-        aria-label={`${open ? t`Close` : t`Change`} ${part}`}
+        aria-label={`${open ? t`Done` : t`Change`} ${part}`}
         onClick={onOpen}
       >
-        {open ? t`Close` : t`Change`}
+        {open ? t`Done` : t`Change`}
       </Button>
       <Button size="compact-sm" variant="default" aria-label={t`Show where ${part} is`} onClick={onShow}>
         <Trans>Show where</Trans>

@@ -36,7 +36,7 @@ export function InputForm({
     : "";
   const note = t`on ${input.segment}${input.direction ? `, ${input.direction}` : ""}${lanes}`;
   return (
-    <PartCard name={input.id} what={t`Vehicles from outside`} note={note} onRemove={onRemove}>
+    <PartCard name={input.id} what={t`Vehicle input`} note={note} onRemove={onRemove}>
       {input.per_hour === null ? (
         <Text size="sm">
           <Trans>

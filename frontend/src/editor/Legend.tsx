@@ -11,6 +11,7 @@ import {
   ROI_BASE,
   ROI_MEMBER,
   TRANSIT,
+  UNUSABLE,
   VEHICLE_NODE,
 } from "../map/colors";
 import type { Step } from "./scene";
@@ -32,7 +33,7 @@ const ROWS = localized((): Partial<Record<Step, [color: string, word: string, sh
   actors: [
     [VEHICLE_NODE, t`Vehicle start`, "round"],
     [PEDESTRIAN_NODE, t`Pedestrian start`, "round"],
-    ["#8b949d", t`No start possible`, "round"],
+    [UNUSABLE, t`No start possible`, "round"],
     [GOAL, t`Suggested goal`, "diamond"],
     [FLOW, t`Vehicle flow`],
   ],

@@ -61,10 +61,10 @@ export function RegionStep({
   const many = (
     <>
       <Button size="compact-sm" variant="default" onClick={onWhole}>
-        <Trans>Take the whole map</Trans>
+        <Trans>Select whole map</Trans>
       </Button>
       <Button size="compact-sm" variant="default" onClick={onSeen}>
-        <Trans>Take all that I see</Trans>
+        <Trans>Select visible area</Trans>
       </Button>
       <Group gap={6} align="center">
         <Button
@@ -73,12 +73,12 @@ export function RegionStep({
           disabled={typeof distance !== "number"}
           onClick={() => onWithin(kept(Number(distance)))}
         >
-          <Trans>Take all within</Trans>
+          <Trans>Select all within</Trans>
         </Button>
         <NumberInput
           size="xs"
           w={92}
-          aria-label={t`Distance from the middle of what is in sight`}
+          aria-label={t`Distance from the centre of the visible area`}
           suffix={` ${sign}`}
           min={Math.ceil(shown(10))}
           max={Math.floor(shown(20_000))}
@@ -88,7 +88,7 @@ export function RegionStep({
           onChange={setDistance}
         />
         <Text size="sm">
-          <Trans>of the middle</Trans>
+          <Trans>of the centre</Trans>
         </Text>
       </Group>
     </>
@@ -104,7 +104,7 @@ export function RegionStep({
         </Text>
         <Group>
           <Button size="compact-sm" variant="default" onClick={onBegin}>
-            <Trans>Begin in the middle of what I see</Trans>
+            <Trans>Start at the map centre</Trans>
           </Button>
           {many}
         </Group>

@@ -89,7 +89,7 @@ export function ParameterCard({
         </Text>
       )}
       <Select
-        label={t`A number to compute from ${name}`}
+        label={t`Link another value to ${name}`}
         placeholder={t`Choose a number`}
         searchable
         limit={100}
@@ -107,10 +107,10 @@ export function ParameterCard({
           size="compact-sm"
           variant="default"
           aria-expanded={open}
-          aria-label={`${open ? t`Close` : t`Change`} ${name}`}
+          aria-label={`${open ? t`Done` : t`Change`} ${name}`}
           onClick={() => setOpen(!open)}
         >
-          {open ? t`Close` : t`Name, unit and bounds`}
+          {open ? t`Done` : t`Name, unit and bounds`}
         </Button>
       </Group>
       {open && (
@@ -237,7 +237,7 @@ function Computed({
         variant="subtle"
         color="gray"
         size="lg"
-        aria-label={t`Let ${label} be a number`}
+        aria-label={t`Unlink ${label}`}
         onClick={() => onFormula(null)}
       >
         <IconTrash />

@@ -114,7 +114,7 @@ function NewParameter({
   return (
     <section className="fold" aria-label={t`New parameter`}>
       <Select
-        label={t`Number that becomes a parameter`}
+        label={t`Value to vary`}
         placeholder={t`Choose a number of the scenario`}
         searchable
         clearable

@@ -35,7 +35,7 @@ export function RoutesForm({ routes, onEdit }: { routes: RouteChoice; onEdit: (e
         />
       )}
       <Committed
-        label={t`Drivers who look for quicker routes on the way`}
+        label={t`Share of drivers rerouting en route`}
         suffix=" %"
         min={0}
         max={100}

@@ -36,8 +36,8 @@ export function StartAndGoal({
   const start = graph.place(one.spawn);
   const moves: [string, () => Place | null][] = start
     ? [
-        [t`Further back`, () => starts.along(start, -1)],
-        [t`Further on`, () => starts.along(start, 1)],
+        [t`Move back`, () => starts.along(start, -1)],
+        [t`Move forward`, () => starts.along(start, 1)],
         [t`Another lane`, () => starts.otherLane(start)],
       ]
     : [];

@@ -16,7 +16,7 @@ const STEPS = localized((): readonly [title: string, text: string][] => [
   ],
   [
     t`2. Choose who`,
-    t`Open “Road users”, choose a kind and click on a blue point for vehicles, a yellow one for pedestrians.`,
+    t`Open “Road users”, choose a kind and click a lane for vehicles, a sidewalk for pedestrians.`,
   ],
   [
     t`3. Run it`,

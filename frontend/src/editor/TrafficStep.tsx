@@ -109,7 +109,7 @@ export function TrafficStep({
           <Trans>Add background traffic</Trans>
         </Button>
         <Button variant="default" aria-expanded={adding === "input"} onClick={() => toggle("input")}>
-          <Trans>Add vehicles from outside</Trans>
+          <Trans>Add vehicle inputs</Trans>
         </Button>
         {adding === "input" && (
           <NewInput

@@ -129,7 +129,7 @@ export function changesOf({
       if (segments.length === 0) {
         say(
           left > 0
-            ? t`These segments do not hang together with the region. Add those between first.`
+            ? t`These segments are not connected to the region. Add those between first.`
             : t`There is nothing to add here: no segment lies in it, or all are in the region.`,
         );
         return;
@@ -141,8 +141,8 @@ export function changesOf({
       if (left > 0)
         say(
           plural(left, {
-            one: "# segment did not hang together with the rest and was left out.",
-            other: "# segments did not hang together with the rest and were left out.",
+            one: "# segment is not connected to the rest and was skipped.",
+            other: "# segments are not connected to the rest and were skipped.",
           }),
         );
     },

@@ -112,6 +112,6 @@ export const shortNumber = (value: number): string => String(Number(value.toPrec
 export const parameterNote = (parameters: Readonly<Record<string, Parameter>>): string => {
   const names = Object.keys(parameters);
   return names.length === 0
-    ? t`Numbers to turn, and sweeps`
+    ? t`Variables and parameter sweeps`
     : plural(names.length, { one: "# parameter", other: "# parameters" });
 };

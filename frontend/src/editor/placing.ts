@@ -151,14 +151,12 @@ export class Starts {
     const options = { vehicles: !walk, walks: walk };
     const allowed = (i: number, onFoot: boolean): boolean => this.graph.usable(i, onFoot);
     if (this.picker.place(x, y, wide, { ...options, inside: this.inside, allowed }))
-      return t`Every point here is occupied. Start the ${who} a little further away.`;
+      return t`Every place here is occupied. Start the ${who} a little further away.`;
     if (this.picker.place(x, y, wide, { ...options, inside: this.inside }))
-      return t`No ${who} may start here: the grey points cannot be used.`;
+      return t`No ${who} may start on this lane.`;
     if (this.picker.place(x, y, wide, options))
       return t`That is outside the region. Start the ${who} inside it, or extend the region.`;
-    const where = walk
-      ? t`Pedestrians start on the yellow points beside the road.`
-      : t`Vehicles start on the blue points of the lanes.`;
+    const where = walk ? t`Pedestrians start on sidewalks and crosswalks.` : t`Vehicles start on lanes.`;
     return t`No ${who} may start here. ${where}`;
   }
 

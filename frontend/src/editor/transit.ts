@@ -24,7 +24,7 @@ export const timetableWord = ({ headway, departures }: Line): string =>
 
 export const transitNote = ({ stops, lines }: Transit): string =>
   stops.length + lines.length === 0
-    ? t`None`
+    ? t({ message: "None", context: "public transport" })
     : [
         plural(lines.length, { one: "# line", other: "# lines" }),
         plural(stops.length, { one: "# stop", other: "# stops" }),

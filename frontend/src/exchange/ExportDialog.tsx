@@ -112,8 +112,8 @@ function Notes({
     );
   return (
     <>
-      <List title={t`Cannot be said, and is left out`} notes={leftOut} />
-      <List title={t`Can only be said approximately`} notes={approximated} />
+      <List title={t`Not exported`} notes={leftOut} />
+      <List title={t`Exported approximately`} notes={approximated} />
       <Text size="xs" c="dimmed">
         <Trans>The same list is in the download.</Trans>
       </Text>

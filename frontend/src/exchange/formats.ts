@@ -7,7 +7,7 @@ import { sentence } from "../ui/words";
 
 /** What formats are that the page has words of its own for. */
 const WORDS = localized((): Record<string, string> => ({
-  openscenario: t`Road users and rules for esmini, ScenarioRunner and others, with the map beside them. SUMO's traffic does not travel.`,
+  openscenario: t`Road users and rules for esmini, ScenarioRunner and others, with the map beside them. SUMO traffic is not exported.`,
   sumo: t`Network, routes and configuration, which run with plain sumo -c.`,
   graphml: t`The lane graph with the scenario on it, for networkx and other graph tools.`,
 }));

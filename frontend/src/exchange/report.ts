@@ -12,7 +12,7 @@ export const VERDICTS = ["refused", "approximated", "ignored", "taken"] as const
 export type Verdict = (typeof VERDICTS)[number];
 
 export const TITLES = localized((): Record<Verdict, string> => ({
-  refused: t`Left out, though it would act`,
+  refused: t`Not supported (affects behaviour)`,
   approximated: t`Imported approximately`,
   ignored: t`Without a counterpart here`,
   taken: t`Imported unchanged`,

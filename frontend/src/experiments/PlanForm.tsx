@@ -130,25 +130,25 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
           onChange={(next) => set({ seed: typeof next === "number" ? next : null })}
         />
         <Bound
-          label={t`Least time to collision of a safe case`}
+          label={t`Minimum TTC of a safe case`}
           suffix={" s"}
           value={form.ttc}
           onValue={(ttc) => set({ ttc })}
         />
         <Bound
-          label={t`Least post-encroachment time`}
+          label={t`Minimum post-encroachment time`}
           suffix={" s"}
           value={form.pet}
           onValue={(pet) => set({ pet })}
         />
         <Bound
-          label={t`Most braking needed`}
+          label={t`Maximum required deceleration`}
           suffix={" m/s²"}
           value={form.drac}
           onValue={(drac) => set({ drac })}
         />
         <Whole
-          label={t`Runs at a time`}
+          label={t`Parallel runs`}
           value={form.processes}
           onValue={(processes) => set({ processes })}
           least={1}
@@ -156,11 +156,11 @@ export function PlanForm({ scenario, document }: { scenario: string; document: S
         />
         <TagsInput
           className="plan-wide"
-          label={t`Figures of runs as more columns`}
+          label={t`Additional result columns`}
           placeholder={t`for example mean_speed`}
           data={[
             { group: t`Figures of runs`, items: names(figures) },
-            { group: t`Of installed packages`, items: names(installed?.filter(({ error }) => !error)) },
+            { group: t`From plug-ins`, items: names(installed?.filter(({ error }) => !error)) },
           ]}
           value={[...form.figures]}
           onChange={(names) => set({ figures: names })}

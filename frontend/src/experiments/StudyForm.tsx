@@ -94,7 +94,7 @@ export function StudyForm() {
       <div className="plan-fields">
         <NumberInput
           label={t`Seeds`}
-          description={t`Runs of each, with other chance`}
+          description={t`Replications per scenario`}
           min={1}
           max={10_000}
           allowDecimal={false}
@@ -109,7 +109,7 @@ export function StudyForm() {
           onChange={(next) => setMinutes(Number(next) > 0 ? Number(next) : null)}
         />
         <NumberInput
-          label={t`At a time`}
+          label={t`Parallel runs`}
           description={t`At most one for each core`}
           min={1}
           max={256}

@@ -59,7 +59,7 @@ function Head({ info, onChanged }: { info: StudyInfo; onChanged: () => void }) {
         <>
           {ended > 0 && (
             <Anchor href={studies.fileUrl(study, "study.html")} target="_blank" rel="noreferrer">
-              <Trans>Whole page, to keep</Trans>
+              <Trans>Download as HTML</Trans>
             </Anchor>
           )}
           {state === "done" && (

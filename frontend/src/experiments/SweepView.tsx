@@ -89,7 +89,7 @@ function Head({ scenario, info, onChanged }: { scenario: string; info: SweepInfo
         state === "done" && (
           <>
             <Anchor href={sweeps.fileUrl(sweep, "sweep.html")} target="_blank" rel="noreferrer">
-              <Trans>Whole page, to keep</Trans>
+              <Trans>Download as HTML</Trans>
             </Anchor>
             <Anchor href={sweeps.fileUrl(sweep, "cases.parquet")}>
               <Trans>Table as Parquet</Trans>

@@ -29,9 +29,9 @@ export interface SweepForm {
   sampleSeed: number;
   /** Of the runs; null is the scenario's. */
   seed: number | null;
-  /** Least time to collision of a safe case, seconds; null asks for no collision only. */
+  /** Minimum TTC of a safe case, seconds; null asks for no collision only. */
   ttc: number | null;
-  /** Least post-encroachment time, seconds, and most braking needed, m/s². */
+  /** Minimum post-encroachment time, seconds, and most braking needed, m/s². */
   pet: number | null;
   drac: number | null;
   /** Limits of other columns: "mean_speed >= 5". */

@@ -12,6 +12,7 @@ const NAMES = localized((): Record<keyof MapLayers, string> => ({
   grid: t`Grid with coordinates`,
   names: t`Names of roads and junctions`,
   nodes: t`Start points and lane graph, when near`,
+  changes: t`Lane changes of the lane graph`,
   signs: t`Signs and traffic lights`,
   buildings: t`Buildings`,
   picture: t`Picture under the map`,

@@ -9,11 +9,11 @@ export const PEDESTRIAN_NODE = "#FFD800";
 export const ROI_BASE = "#123F8C";
 export const ROI_MEMBER = "#2B62BD";
 export const ELIGIBLE = "#7CC8FF";
-export const GOAL = "#5AC3FF";
+export const GOAL = "#66CCEE";
 /** Flows of vehicles; those of pedestrians have the colour of their places. */
 export const FLOW = "#0C8599";
 export const PROBLEM = "#E03131";
-export const MEASURE = "#B45309";
+export const MEASURE = "#A5690F";
 export const TRANSIT = "#364FC7";
 
 export interface Palette {
@@ -93,18 +93,24 @@ export const CATEGORY_COLOR: Record<Category, string> = {
   bicycle: "#2b8a3e",
   pedestrian: "#f2b600",
 };
-export const EGO = "#e03131";
+export const EGO = "#ff2255";
+/** Lamps of vehicles that brake, and that are about to turn. */
+export const BRAKES = "#ff2a1f";
+export const INDICATOR = "#ff9900";
+/** Places where no start is possible, and whatever says nothing. */
+export const UNUSABLE = "#8b949d";
 /** Detectors of the traffic light that is looked at. */
 export const DETECTOR = "#2f6fb5";
+/** White signs are read on them; told apart from each other and from kinds of road users. */
 export const MARK_COLOR: Record<MarkKind, string> = {
-  collision: "#c92a2a",
-  braking: "#b8500b",
-  teleported: "#5f3dc4",
-  jam: "#a61e4d",
+  collision: "#c32d3c",
+  braking: "#873c1e",
+  teleported: "#5a2db4",
+  jam: "#960f4b",
   measure: MEASURE,
-  rule: "#1864ab",
-  met: "#0b7285",
-  unmet: "#d9480f",
+  rule: "#0f5a87",
+  met: "#1e7887",
+  unmet: "#d22d00",
 };
 
 /** What traffic lights show, the same in light and dark. */

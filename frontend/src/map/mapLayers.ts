@@ -5,8 +5,10 @@ export interface MapLayers {
   grid: boolean;
   /** Names of segments: roads and junctions. */
   names: boolean;
-  /** Nodes of the lane graph and of the walks, and their edges, when near. */
+  /** Nodes of the lane graph and of the walks, and their edges ahead, when near. */
   nodes: boolean;
+  /** Edges of the lane graph to the lanes beside, too: they cross each other between each pair of lanes. */
+  changes: boolean;
   /** Signs and traffic lights of the map. */
   signs: boolean;
   buildings: boolean;
@@ -19,6 +21,7 @@ export const FIRST_LAYERS: MapLayers = {
   grid: false,
   names: false,
   nodes: true,
+  changes: false,
   signs: true,
   buildings: true,
   picture: true,

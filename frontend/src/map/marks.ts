@@ -317,6 +317,11 @@ export function drawWaypoint(
   context.fillText(String(number), x, y + 0.5);
 }
 
+/** Pixels; a motorcycle is seen, too. */
+const LEAST_WIDTH = 5;
+/** Pixels of a body's width from which its kind is drawn in it. */
+const GLYPH_FROM = 11;
+
 export function body(
   context: CanvasRenderingContext2D,
   x: number,
@@ -324,15 +329,14 @@ export function body(
   view: View,
   actor: SceneActor,
   color: string,
+  ring: string | null,
 ): void {
   context.save();
   context.translate(x, y);
   context.rotate(-actor.hdg);
   const l = actor.length * view.scale;
-  const w = actor.width * view.scale;
+  const w = Math.max(LEAST_WIDTH, actor.width * view.scale);
   context.fillStyle = color;
-  context.strokeStyle = "#ffffff";
-  context.lineWidth = 1.5;
   context.beginPath();
   context.moveTo(-l / 2, -w / 2);
   context.lineTo(l / 2 - w * 0.35, -w / 2);
@@ -341,8 +345,43 @@ export function body(
   context.lineTo(l / 2 - w * 0.35, w / 2);
   context.lineTo(-l / 2, w / 2);
   context.closePath();
+  for (const [stroke, width] of [[ring, 6] as const, ["#ffffff", 1.5] as const]) {
+    if (stroke === null) continue;
+    context.strokeStyle = stroke;
+    context.lineWidth = width;
+    context.stroke();
+  }
   context.fill();
-  context.stroke();
+  context.restore();
+}
+
+/** The kind of a road user in its body, which is so many pixels wide; nothing where it would not be seen. */
+export function inBody(
+  context: CanvasRenderingContext2D,
+  glyph: Path2D,
+  x: number,
+  y: number,
+  width: number,
+  category: Category,
+): void {
+  if (width < GLYPH_FROM) return;
+  drawGlyph(context, glyph, x, y, Math.min(width * 0.85, 26), category);
+}
+
+function drawGlyph(
+  context: CanvasRenderingContext2D,
+  glyph: Path2D,
+  x: number,
+  y: number,
+  size: number,
+  category: Category,
+): void {
+  context.save();
+  context.translate(x, y);
+  context.scale(size / 24, size / 24);
+  context.translate(-12, -12);
+  context.fillStyle = category === "pedestrian" ? "#22282e" : "#ffffff";
+  context.fill(glyph, "evenodd");
   context.restore();
 }
 
@@ -355,21 +394,14 @@ export function badge(
   color: string,
   category: Category,
 ): void {
-  context.save();
-  context.translate(x, y);
   context.beginPath();
-  context.arc(0, 0, radius, 0, 2 * Math.PI);
+  context.arc(x, y, radius, 0, 2 * Math.PI);
   context.fillStyle = color;
   context.fill();
   context.lineWidth = 1.5;
   context.strokeStyle = "#ffffff";
   context.stroke();
-  const k = (radius * 1.45) / 24;
-  context.scale(k, k);
-  context.translate(-12, -12);
-  context.fillStyle = category === "pedestrian" ? "#22282e" : "#ffffff";
-  context.fill(glyph, "evenodd");
-  context.restore();
+  drawGlyph(context, glyph, x, y, radius * 1.45, category);
 }
 
 /** A round sign with a name below it: orange for measures, dark blue for public transport, blue for rules. */

@@ -1,7 +1,7 @@
 import { CATEGORIES } from "../api/types";
 import { nth } from "../lists";
 import type { Head } from "../signals/heads";
-import { CATEGORY_COLOR, EGO, MARK_COLOR, type Palette, SIGNAL_COLOR } from "./colors";
+import { BRAKES, CATEGORY_COLOR, EGO, INDICATOR, MARK_COLOR, type Palette, SIGNAL_COLOR } from "./colors";
 import { drawMeasured, type MeasureMarks } from "./measureMarks";
 import type { Mark, MarkKind, Moving } from "./scene";
 import { type Size, type View, visible } from "./view";
@@ -140,11 +140,11 @@ function details(
   }
   const lamp = Math.min(0.45, side * 0.6);
   if (flags & FLAG_BRAKE) {
-    context.fillStyle = "#ff2a1f";
+    context.fillStyle = BRAKES;
     context.fillRect(-half, -side, lamp * 0.7, lamp);
     context.fillRect(-half, side - lamp, lamp * 0.7, lamp);
   }
-  context.fillStyle = "#ffab00";
+  context.fillStyle = INDICATOR;
   if (flags & FLAG_LEFT) corners(context, half, -side, lamp);
   if (flags & FLAG_RIGHT) corners(context, half, side - lamp, lamp);
   context.restore();

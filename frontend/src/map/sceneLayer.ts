@@ -9,6 +9,7 @@ import {
   RELATION,
   ROI_BASE,
   ROI_MEMBER,
+  UNUSABLE,
   VEHICLE_NODE,
 } from "./colors";
 import { clustered } from "./clusters";
@@ -20,6 +21,7 @@ import { drawGrid } from "./gridLayer";
 import { addRing, ColoredLanes } from "./laneShapes";
 import type { MapLayers } from "./mapLayers";
 import { drawNames, type SegmentName, segmentNames } from "./namesLayer";
+import { badgeRadius, type Marker, markers } from "./markers";
 import {
   badge,
   body,
@@ -36,19 +38,18 @@ import {
   drawRoute,
   drawWalkEdges,
   drawWaypoint,
+  inBody,
   spot,
   tag,
 } from "./marks";
 import type { Picker } from "./picking";
-import type { Scene, SceneActor, SegmentStyle } from "./scene";
+import type { Scene, SegmentStyle } from "./scene";
 import { type PathMaker, screenPath } from "./svg";
 import { overlaps, type Size, type View, visible, worldTransform } from "./view";
 import type { Bounds, Category } from "../api/types";
 
 const NODES_FROM = 2.6;
 const EDGES_FROM = 7;
-/** From so many on, each is a dot while the whole map is in sight. */
-const MANY = 300;
 /** More names than these would lie on top of each other. */
 const FEW = 3;
 /** Signs are named from so many pixels a metre on, or where they are few. */
@@ -60,7 +61,6 @@ const ARROW = 26;
 const ROOM = 12;
 /** Pixels from a detector down to its name. */
 const DETECTOR_NAME = 18;
-const UNUSABLE = "#8b949d";
 
 const SEGMENT: Record<SegmentStyle, { fill: string; alpha: number }> = {
   base: { fill: ROI_BASE, alpha: 0.72 },
@@ -108,7 +108,7 @@ export class SceneLayer {
     this.colored.draw(context, view, scene.laneColors ?? null);
     this.drawSegments(context, view, size, scene);
     if (layers.nodes && this.graph && this.picker && view.scale >= NODES_FROM) {
-      this.drawGraph(context, view, size, scene, palette);
+      this.drawGraph(context, view, size, scene, palette, layers.changes);
     }
     drawRoute(context, view, scene);
     if (scene.ghosts) drawGhosts(context, view, scene.ghosts, palette);
@@ -129,15 +129,14 @@ export class SceneLayer {
     if (scene.chosenGoal) drawGoal(context, at(scene.chosenGoal.x, scene.chosenGoal.y), true);
     scene.waypoints.forEach((place, n) => drawWaypoint(context, at(place.x, place.y), n + 1));
     if (scene.hover) this.drawHover(context, at, view, scene.hover, scene.hoverCategory);
-    const plain = scene.actors.length > MANY && view.scale < NODES_FROM;
     const named = scene.actors.reduce((n, actor) => n + Number(actor.selected), 0) <= FEW;
     const seen = visible(view, size);
-    for (const actor of scene.actors) {
+    for (const marker of markers(scene.actors, at, view.scale)) {
+      const { actor, x, y, look } = marker;
       const box: Bounds = [actor.x - ROOM, actor.y - ROOM, actor.x + ROOM, actor.y + ROOM];
       if (!overlaps(box, seen)) continue;
-      if (plain && !actor.selected && !actor.ego && !actor.problem) {
-        spot(context, at(actor.x, actor.y), CATEGORY_COLOR[actor.category]);
-      } else this.drawActor(context, at(actor.x, actor.y), view, actor, palette, named);
+      if (look === "dot") spot(context, [x, y], CATEGORY_COLOR[actor.category]);
+      else this.drawActor(context, marker, view, palette, named);
     }
     const namedPins = view.scale >= NAMED_FROM || scene.pins.length <= FEW_PINS;
     for (const { x, y, pins } of clustered(scene.pins, namedPins ? Infinity : view.scale)) {
@@ -192,6 +191,7 @@ export class SceneLayer {
     size: Size,
     scene: Scene,
     palette: Palette,
+    changes: boolean,
   ): void {
     if (!this.graph || !this.picker) return;
     const { columns } = this.graph;
@@ -201,7 +201,7 @@ export class SceneLayer {
       const rows = this.picker
         .within(...seen, false)
         .filter((i) => !inside || inside.has(nth(columns.segment, i)));
-      if (view.scale >= EDGES_FROM) this.drawEdges(context, view, new Set(rows), palette);
+      if (view.scale >= EDGES_FROM) this.drawEdges(context, view, new Set(rows), palette, changes);
       this.drawPlaces(context, view, rows, false);
     }
     if (scene.nodes.walks) {
@@ -235,11 +235,13 @@ export class SceneLayer {
     );
   }
 
+  /** Edges to the nodes ahead; with `changes` those to the lanes beside, too, which cross between each pair. */
   private drawEdges(
     context: CanvasRenderingContext2D,
     view: View,
     rows: Set<number>,
     palette: Palette,
+    changes: boolean,
   ): void {
     if (!this.graph) return;
     const { columns } = this.graph;
@@ -249,7 +251,7 @@ export class SceneLayer {
       color: n === 0 ? palette.successor : color,
     }));
     for (let e = 0; e < source.length; e++) {
-      if (!rows.has(nth(source, e))) continue;
+      if (!rows.has(nth(source, e)) || (!changes && nth(relation, e) !== 0)) continue;
       const { path } = nth(paths, nth(relation, e));
       const [from, to] = [nth(source, e), nth(target, e)];
       path.moveTo(nth(columns.x, from), nth(columns.y, from));
@@ -301,29 +303,40 @@ export class SceneLayer {
     }
   }
 
+  /** A body with its kind in it, or a badge in its place; a ring and corners around those one looks at. */
   private drawActor(
     context: CanvasRenderingContext2D,
-    [x, y]: [number, number],
+    { actor, x, y, look }: Marker,
     view: View,
-    actor: SceneActor,
     palette: Palette,
     named: boolean,
   ): void {
     const color = CATEGORY_COLOR[actor.category];
-    const near = actor.length * view.scale > 10;
-    if (near && actor.offset) drawOffset(context, x, y, view, actor, palette);
-    if (near) body(context, x, y, view, actor, color);
-    const lift = near ? Math.max(20, actor.width * view.scale * 0.5 + 18) : 0;
-    const radius = actor.selected ? 14 : 12;
-    if (actor.selected || actor.ego || actor.problem) {
-      context.beginPath();
-      context.arc(x, y - lift, radius + 3, 0, 2 * Math.PI);
-      context.fillStyle = actor.problem ? PROBLEM : actor.ego ? EGO : palette.ink;
-      context.fill();
+    const ring = actor.problem ? PROBLEM : actor.ego ? EGO : actor.selected ? palette.ink : null;
+    const radius = badgeRadius(view.scale) + (actor.selected ? 2 : 0);
+    let half = radius;
+    if (look === "body") {
+      if (actor.offset) drawOffset(context, x, y, view, actor, palette);
+      body(context, x, y, view, actor, color, ring);
+      inBody(context, this.glyphs[actor.category], x, y, actor.width * view.scale, actor.category);
+      const [c, s] = [Math.abs(Math.cos(actor.hdg)), Math.abs(Math.sin(actor.hdg))];
+      half = Math.max(8, ((actor.length * s + actor.width * c) * view.scale) / 2);
+      if (actor.selected) {
+        const wide = ((actor.length * c + actor.width * s) * view.scale) / 2;
+        brackets(context, [x, y], Math.max(half, wide) + 5, palette.ink);
+        half = Math.max(half, wide) + 5;
+      }
+    } else {
+      if (ring) {
+        context.beginPath();
+        context.arc(x, y, radius + 3, 0, 2 * Math.PI);
+        context.fillStyle = ring;
+        context.fill();
+      }
+      if (actor.selected) brackets(context, [x, y], radius + 7, palette.ink);
+      badge(context, this.glyphs[actor.category], x, y, radius, color, actor.category);
     }
-    if (actor.selected) brackets(context, [x, y - lift], radius + 7, palette.ink);
-    badge(context, this.glyphs[actor.category], x, y - lift, radius, color, actor.category);
-    const top = y - lift - radius - (actor.selected ? 18 : 11);
+    const top = y - half - (actor.selected ? 18 : 11);
     if (actor.ego) tag(context, "EGO", x, top);
     else if (actor.selected && named) tag(context, actor.id, x, top);
   }

@@ -4,11 +4,11 @@ import { Trans } from "@lingui/react/macro";
 import { useCallback, useEffect, useState } from "react";
 
 import { type RunInfo, runs } from "../api/runs";
-import { served } from "../language/served";
 import { IconTrash } from "../ui/icons";
 import { RemovalDialog, type ToRemove } from "../ui/RemovalDialog";
 import { hashOf } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
+import { verdictWord } from "../ui/words";
 import { hasEnded, STATE_WORD, when } from "./figures";
 
 /** How often the list is asked for while a run in it is live, milliseconds. */
@@ -124,7 +124,7 @@ export function EarlierRuns({
 
 const outcome = ({ state, summary }: RunInfo): string =>
   (state === "completed" || state === "stopped") && summary?.usable
-    ? `${STATE_WORD()[state]}, ${served(summary.usable.level)}`
+    ? `${STATE_WORD()[state]}, ${verdictWord(summary.usable.level)}`
     : STATE_WORD()[state];
 const watchWord = ({ state }: RunInfo): string => (state === "interrupted" ? t`Resume` : t`Watch`);
 const hasReport = ({ state }: RunInfo): boolean => state === "completed" || state === "stopped";

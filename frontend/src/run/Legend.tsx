@@ -3,7 +3,7 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
 import { CATEGORIES, type Category } from "../api/types";
-import { CATEGORY_COLOR, DARK, EGO, LIGHT, MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
+import { BRAKES, CATEGORY_COLOR, DARK, EGO, INDICATOR, LIGHT, MARK_COLOR, SIGNAL_COLOR } from "../map/colors";
 import type { MarkKind } from "../map/scene";
 import { CategoryGlyph } from "../ui/icons";
 import { CATEGORY_WORD } from "../ui/words";
@@ -80,7 +80,7 @@ export function Legend({
         <li>
           <span>
             <Trans>
-              <i style={{ background: "#ff2a1f" }} />
+              <i style={{ background: BRAKES }} />
               Brakes
             </Trans>
           </span>
@@ -90,7 +90,7 @@ export function Legend({
         <li>
           <span>
             <Trans>
-              <i style={{ background: "#ffab00" }} />
+              <i style={{ background: INDICATOR }} />
               Indicator
             </Trans>
           </span>

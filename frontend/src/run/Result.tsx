@@ -9,6 +9,7 @@ import { carla } from "../api/carla";
 import { allFigures } from "../api/figures";
 import { type RunInfo, runs, type RunWish, type Summary, type Verdict } from "../api/runs";
 import { driverWords } from "../ui/drivers";
+import { verdictWord } from "../ui/words";
 import { tellError } from "../ui/notices";
 import { go } from "../ui/address";
 import { useLoaded } from "../ui/useLoaded";
@@ -65,9 +66,9 @@ export function Result({
   return (
     <section aria-label={t`Result of the run`}>
       <Title order={2} size="h3">
-        {TITLE()[info.state] ?? t`The run is finished`}
+        {TITLE()[info.state] ?? t`Run finished`}
         {verdict &&
-          `: ${info.summary && isJudged(info.summary) ? passed(info.summary) : served(verdict.level)}`}
+          `: ${info.summary && isJudged(info.summary) ? passed(info.summary) : verdictWord(verdict.level)}`}
       </Title>
       {info.summary?.behaviour && (
         <Text size="sm" c="dimmed">

@@ -71,7 +71,7 @@ export function LiveStrip({
         </Button>
         {info.slices && (
           <Button variant="default" disabled={!going} onClick={() => control("interrupt")}>
-            <Trans>Resume later</Trans>
+            <Trans>Pause and save</Trans>
           </Button>
         )}
         <SpeedChoice

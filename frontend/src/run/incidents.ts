@@ -34,7 +34,7 @@ const KIND: Partial<Record<Incident["kind"], MarkKind>> = {
 export const MARK_WORD = localized((): Record<MarkKind, string> => ({
   collision: t`Collision`,
   braking: t`Emergency braking`,
-  teleported: t`Teleported`,
+  teleported: t`Removed and re-inserted (SUMO “teleport”)`,
   jam: t`Jam`,
   measure: t`Measure`,
   rule: t`Rule`,
@@ -75,11 +75,11 @@ export function sentence(incident: Incident, categories: ReadonlyMap<string, Cat
     case "measure_end":
       return t`Measure ${incident.actor} ended`;
     case "rule_started":
-      return t`${who} began rule ${rule}${values(incident)}`;
+      return t`${who} triggered rule ${rule}${values(incident)}`;
     case "rule_acted":
       return t`${who}: ${detail} (rule ${rule})`;
     case "rule_ended":
-      return t`${who} has done rule ${rule}`;
+      return t`${who} completed rule ${rule}`;
     case "rule_failed":
       return t`${who} could not do rule ${rule}: ${detail}`;
     case "rule_overridden":

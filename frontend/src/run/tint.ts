@@ -2,7 +2,7 @@ import { t } from "@lingui/core/macro";
 
 import { speedText } from "../language/units";
 import { localized } from "../language/localized";
-import { SIGNAL_COLOR } from "../map/colors";
+import { BRAKES, INDICATOR, SIGNAL_COLOR, UNUSABLE } from "../map/colors";
 import type { Tint } from "../map/scene";
 import { FLAG_BRAKE, FLAG_LEFT, FLAG_RIGHT } from "../map/movingLayer";
 import { nth } from "../lists";
@@ -70,13 +70,13 @@ export const SCALES = localized((): Record<Exclude<ColourBy, "kind">, Scale> => 
   },
   signal: {
     word: t`Light ahead`,
-    colors: ["#8b949d", SIGNAL_COLOR.green, "#a3e635", SIGNAL_COLOR.yellow, SIGNAL_COLOR.red],
+    colors: [UNUSABLE, SIGNAL_COLOR.green, "#a3e635", SIGNAL_COLOR.yellow, SIGNAL_COLOR.red],
     legend: [t`No light ahead`, t`May go`, t`May go, gives way`, t`Yellow`, t`Red`],
     of: (frame, row) => frame.ahead?.[row] ?? 0,
   },
   lamps: {
     word: t`Brakes and indicators`,
-    colors: ["#8b949d", "#ffab00", "#e8251b"],
+    colors: [UNUSABLE, INDICATOR, BRAKES],
     legend: [t`Neither`, t`Indicator`, t`Brakes`],
     of: (frame, row) => {
       const flags = nth(frame.rows, 6 * row + 5);

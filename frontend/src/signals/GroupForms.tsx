@@ -48,11 +48,11 @@ export function GroupForms({ light, junction, timing, editing }: Props) {
               size="compact-sm"
               variant="default"
               aria-expanded={open === group.id}
-              aria-label={open === group.id ? t`Close ${group.id}` : t`Change ${group.id}`}
+              aria-label={open === group.id ? t`Done ${group.id}` : t`Change ${group.id}`}
               style={{ flexShrink: 0 }}
               onClick={() => setOpen(open === group.id ? null : group.id)}
             >
-              {open === group.id ? t`Close` : t`Change`}
+              {open === group.id ? t`Done` : t`Change`}
             </Button>
           </Group>
           {open === group.id && (

@@ -66,7 +66,7 @@ export function ProgramControl({ light, junction, editing }: Editable) {
       <Group gap="xs">
         {!own && (
           <Button size="compact-sm" variant="default" onClick={() => void editing.takeOver()}>
-            <Trans>Make the program the scenario’s own</Trans>
+            <Trans>Customise this program</Trans>
           </Button>
         )}
         {timing && (
@@ -106,7 +106,7 @@ export function TurnChoices({ light, junction, editing }: Editable) {
             <Treatment light={light} turn={turn} junction={junction} editing={editing} />
           ) : (
             <Text size="xs" c="dimmed">
-              <Trans>through gaps: it has no lane for itself</Trans>
+              <Trans>permissive: shared lane</Trans>
             </Text>
           )}
         </div>
@@ -223,7 +223,7 @@ export function TimingTools({
   return (
     <>
       <h3>
-        <Trans>Times by rule</Trans>
+        <Trans>Signal optimisation</Trans>
       </h3>
       <Group gap="xs">
         <Button
@@ -232,7 +232,7 @@ export function TimingTools({
           loading={busy}
           onClick={() => void ask((version) => signals.webster(name, version, [junction], arrows))}
         >
-          <Trans>Time it after the demand (Webster)</Trans>
+          <Trans>Optimise for demand (Webster)</Trans>
         </Button>
         {junctions.length > 1 && (
           <Button
@@ -247,7 +247,7 @@ export function TimingTools({
       </Group>
       <Switch
         size="sm"
-        label={t`With arrows for turns where the volumes ask for them`}
+        label={t`Add protected turns where volumes warrant`}
         description={t`Turns across oncoming traffic with a lane for themselves get a protected stage, too.`}
         checked={arrows}
         onChange={({ currentTarget: { checked } }) => setArrows(checked)}

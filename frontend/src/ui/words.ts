@@ -37,6 +37,15 @@ export const styleWord = (style: string): string =>
 export const styleChoices = (sets: readonly string[]): { value: string; label: string }[] =>
   [...Object.keys(STYLE_WORD()), ...sets].map((value) => ({ value, label: styleWord(value) }));
 
+/** Whether the results of a run are valid, by the level of its verdict. */
+const VERDICT_WORD = localized(() => ({
+  usable: t`results valid`,
+  "usable with reservations": t`results valid with reservations`,
+  "not usable": t`results not valid`,
+}));
+export const verdictWord = (level: string): string =>
+  isKey(VERDICT_WORD(), level) ? VERDICT_WORD()[level] : level;
+
 /** Who drives a vehicle that no rule moves. */
 export const DRIVERS = localized(() => ({ sumo: t`SUMO's drivers`, story: t`The story alone` }));
 

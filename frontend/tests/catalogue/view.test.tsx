@@ -7,6 +7,7 @@ import { Conversion } from "../../src/catalogue/Conversion";
 import { NoticeList } from "../../src/ui/notices";
 import { mapInfo } from "../example";
 import { choose, rowsOf, server, show } from "../page";
+import { stubFetch } from "../requests";
 
 const names = (): (string | null)[] =>
   within(screen.getByRole("list", { name: "Maps" }))
@@ -55,6 +56,56 @@ const entryOf = (name: string, modified: number, title = name) => ({
   actors: 3,
   modified,
   error: null,
+});
+
+const CUT_IN = {
+  name: "cut-in",
+  title: "Cut-in",
+  summary: "A slower vehicle changes into the lane of the ego.",
+  source: "UN Regulation No. 157",
+  needs: "two lanes of one direction",
+  numbers: [
+    {
+      name: "speed",
+      title: "Cut-in vehicle speed",
+      usual: 10,
+      low: 1,
+      high: 58,
+      unit: "m/s",
+      meaning: "speed",
+    },
+    { name: "ttc", title: "Time to collision", usual: null, low: 0.1, high: 10, unit: "s", meaning: "limit" },
+  ],
+};
+
+test("maps with room for a template are listed first, and of the others it is said why not", async () => {
+  const why = "Village has no room for a cut-in: of 3 lanes none has one beside it";
+  stubFetch(({ path, body }) => {
+    const { map } = (body ?? {}) as { map?: string };
+    const answer = path.endsWith("/room")
+      ? { reason: map === "Village" ? why : "" }
+      : path.endsWith("/templates")
+        ? [CUT_IN]
+        : path.endsWith("/maps")
+          ? [mapInfo("Village", 0), mapInfo("Town", 9)]
+          : [];
+    return new Response(JSON.stringify(answer));
+  });
+  const { user } = show(<CatalogueView />);
+  await user.click(await screen.findByRole("button", { name: "Place on a map: Cut-in" }));
+  const dialog = await screen.findByRole("dialog", { name: "Cut-in" });
+  expect(within(dialog).getByRole("textbox", { name: "Cut-in vehicle speed (km/h)" })).toBeTruthy();
+  expect(within(dialog).getByRole("textbox", { name: "Time to collision (s)" })).toHaveProperty(
+    "placeholder",
+    "calculated",
+  );
+  await user.click(within(dialog).getByRole("textbox", { name: "Map" }));
+  expect(await screen.findByText("Without a suitable location")).toBeTruthy();
+  const names = screen.getAllByRole("option").map((one) => one.textContent ?? "");
+  expect(names.filter((one) => ["Town", "Village"].includes(one))).toEqual(["Town", "Village"]);
+  expect(screen.queryByText("Not checked yet")).toBeNull();
+  await user.click(screen.getByRole("option", { name: "Village" }));
+  expect((await within(dialog).findByRole("alert")).textContent).toContain(why);
 });
 
 test("own scenarios come first, the newest at the top, and two of one title are told apart", async () => {

@@ -241,9 +241,9 @@ test("start and goal can be set without the map", async () => {
     />
   );
   const { user, again } = show(part(null));
-  await user.click(screen.getByRole("button", { name: "Further on" }));
+  await user.click(screen.getByRole("button", { name: "Move forward" }));
   expect(onStart).toHaveBeenCalledWith("1.0.-1.1");
-  await user.click(screen.getByRole("button", { name: "Further back" }));
+  await user.click(screen.getByRole("button", { name: "Move back" }));
   expect(onStart).toHaveBeenCalledTimes(1);
   expect(screen.getByRole("textbox", { name: "Goal" })).toHaveProperty("value", "Random (one of 1)");
   await choose(user, "Goal", "Road 1, right lane 1, 2 m");
@@ -323,8 +323,8 @@ test("a start from which no goal can be reached says so", () => {
   expect(screen.getByText(/No goal can be reached from here/)).toBeTruthy();
   const moves = within(screen.getByRole("group", { name: "Move the start" }));
   expect(moves.getAllByRole("button").map((one) => one.textContent)).toEqual([
-    "Further back",
-    "Further on",
+    "Move back",
+    "Move forward",
     "Another lane",
   ]);
 });

@@ -223,7 +223,7 @@ test("lane and compass heading of the start are said before the click", () => {
 test("a click where nothing can start says why, and without a region leads to it", () => {
   const outside = using(placeTool("car"), scenario([], ["c"]));
   outside.handler.pick(at(0, 0));
-  expect(outside.log.said).toEqual(["No car may start here: the grey points cannot be used."]);
+  expect(outside.log.said).toEqual(["No car may start on this lane."]);
   const without = using(placeTool("car"), scenario([], []));
   without.handler.pick(at(0, 0));
   expect(without.log.steps).toEqual(["region"]);

@@ -266,9 +266,9 @@ test("a region is begun by a click on the map, or with what is in its middle", a
       onShow={vi.fn()}
     />,
   );
-  await user.click(screen.getByRole("button", { name: "Begin in the middle of what I see" }));
+  await user.click(screen.getByRole("button", { name: "Start at the map centre" }));
   expect(onBegin).toHaveBeenCalledOnce();
-  await user.click(screen.getByRole("button", { name: "Take all within" }));
+  await user.click(screen.getByRole("button", { name: "Select all within" }));
   expect(onWithin).toHaveBeenCalledWith(300);
 });
 
@@ -317,7 +317,7 @@ test("a kind is taken into the hand and put back with the same button", async ()
   expect(screen.getByRole("button", { name: "Pedestrian", pressed: true })).toBeTruthy();
   expect(
     screen.getByText(
-      "Now click where the pedestrian starts: a yellow point on the map. Escape stops placing.",
+      "Now click where the pedestrian starts, on a sidewalk or crosswalk. Escape stops placing.",
     ),
   ).toBeTruthy();
   await user.click(screen.getByRole("button", { name: "Use the next free point" }));

@@ -65,14 +65,14 @@ test("a parameter has a slider between its bounds, and the formulas that use it"
   });
   await user.click(screen.getByRole("button", { name: "Show where ego: speed is" }));
   expect(onShow).toHaveBeenCalledWith({ root: "actors", id: "ego" });
-  await user.click(screen.getByRole("button", { name: "Let ego: speed be a number" }));
+  await user.click(screen.getByRole("button", { name: "Unlink ego: speed" }));
   expect(onEdit).toHaveBeenLastCalledWith({ kind: "set_formula", place: "actors/ego/speed", formula: null });
   expect(screen.getByRole("link", { name: "Sweep the parameters" }).getAttribute("href")).toBe("#/sweeps/s");
 });
 
 test("a number becomes a parameter in one step", async () => {
   const { user, onEdit } = shown();
-  await choose(user, "Number that becomes a parameter", "van: depart, now 0");
+  await choose(user, "Value to vary", "van: depart, now 0");
   await user.click(screen.getByRole("button", { name: "Add the parameter" }));
   expect(onEdit).toHaveBeenCalledWith(
     [

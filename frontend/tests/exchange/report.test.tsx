@@ -83,7 +83,7 @@ test("the report begins with how much, lists the refused first and shows places 
   expect(counts).toEqual(["1", "2", "4", "3"]);
   const sections = screen.getAllByRole("region");
   expect(sections.map((one) => one.getAttribute("aria-label"))).toEqual([
-    "Left out, though it would act",
+    "Not supported (affects behaviour)",
     "Imported approximately",
     "Without a counterpart here",
     "Imported unchanged",
@@ -154,7 +154,7 @@ test("an export says what its version cannot before it is downloaded", async () 
     },
   });
   show(<ExportDialog name="a" format={OPENSCENARIO} onClose={() => undefined} />);
-  expect(await screen.findByText("Cannot be said, and is left out: 2")).toBeTruthy();
+  expect(await screen.findByText("Not exported: 2")).toBeTruthy();
   expect(screen.getByText("flows, seed")).toBeTruthy();
   expect(asked[0]?.path).toBe("/api/scenarios/a/export/notes?to=openscenario&version=1.2");
   const link = screen.getByRole("link", { name: "Download (ZIP)" });

@@ -177,7 +177,7 @@ test("figures of installed packages are offered as columns, but for those that c
     "/api/sweeps/plan": planned,
   });
   const { user } = show(<PlanForm scenario="s" document={swept} />);
-  await user.click(screen.getByRole("textbox", { name: "Figures of runs as more columns" }));
+  await user.click(screen.getByRole("textbox", { name: "Additional result columns" }));
   await user.click(await screen.findByRole("option", { name: "top_speed" }));
   expect(screen.queryByRole("option", { name: "gone" })).toBeNull();
   await user.click(screen.getByRole("button", { name: "Plan the sweep" }));

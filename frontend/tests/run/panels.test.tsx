@@ -46,7 +46,7 @@ const progressAt = (time: number, until: number, more: Partial<RunProgress> = {}
 });
 const now = { time: 65, pace: 2.5, running: 7, arrived: 3, there: new Set<string>() };
 
-const REASON = "gridlock that did not dissolve, first at e_0 since 700 s";
+const REASON = "unresolved gridlock, first at e_0 since 700 s";
 const GRIDLOCKED = summary({
   usable: {
     level: "not usable",
@@ -87,7 +87,7 @@ test("a long run can be interrupted to be resumed later, and says how long it st
       learn={vi.fn()}
     />,
   );
-  expect(screen.getByRole("button", { name: "Resume later" })).toHaveProperty("disabled", false);
+  expect(screen.getByRole("button", { name: "Pause and save" })).toHaveProperty("disabled", false);
   expect(screen.queryByRole("button", { name: "One step" })).toBeNull();
   expect(screen.getByText("Running, about 1 h 01 min left")).toBeTruthy();
 });
@@ -178,7 +178,7 @@ test("earlier runs are listed newest first, and those that were interrupted can 
   expect(await screen.findByRole("link", { name: "Resume s-2" })).toBeTruthy();
   expect(rowsOf(screen.getByRole("table")).map((row) => row[1])).toEqual([
     "Interrupted",
-    "Finished, not usable",
+    "Finished, results not valid",
   ]);
   expect(screen.queryByRole("link", { name: "Report of s-2" })).toBeNull();
   await user.click(screen.getByRole("button", { name: "Remove s-1" }));
@@ -345,7 +345,11 @@ test("the legend has only what can be in the picture", () => {
       marks={new Set(["teleported"])}
     />,
   );
-  expect(screen.getAllByRole("listitem").map((one) => one.textContent)).toEqual(["Car", "Bus", "Teleported"]);
+  expect(screen.getAllByRole("listitem").map((one) => one.textContent)).toEqual([
+    "Car",
+    "Bus",
+    "Removed and re-inserted (SUMO “teleport”)",
+  ]);
 });
 
 test("a chart is a table too, with gaps where nothing is known", () => {
@@ -389,7 +393,7 @@ test("a gridlocked run is not simply finished: the result opens with why it is n
       onShow={null}
     />,
   );
-  expect(screen.getByRole("heading", { level: 2 }).textContent).toBe("The run is finished: not usable");
+  expect(screen.getByRole("heading", { level: 2 }).textContent).toBe("Run finished: results not valid");
   expect(screen.getByText("The figures of this run cannot be used")).toBeTruthy();
-  expect(screen.getByText(/^gridlock that did not dissolve, first at e_0/)).toBeTruthy();
+  expect(screen.getByText(/^unresolved gridlock, first at e_0/)).toBeTruthy();
 });

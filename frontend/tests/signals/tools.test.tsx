@@ -105,14 +105,14 @@ test("the program of the map has to be made the scenario's own before its turns 
   const choice = await screen.findByRole("radio", { name: "Arrow only" });
   expect(choice).toHaveProperty("disabled", true);
   expect(screen.queryByRole("link", { name: "Export for SUMO" })).toBeNull();
-  await user.click(screen.getByRole("button", { name: /the scenario’s own$/ }));
+  await user.click(screen.getByRole("button", { name: "Customise this program" }));
   expect(editing.takeOver).toHaveBeenCalledTimes(1);
 });
 
 test("lights are timed by buttons, and what came of it is said", async () => {
   const editing = editable();
   const { user } = show(panel(program(), editing, ["10", "11"]));
-  await user.click(await screen.findByRole("button", { name: "Time it after the demand (Webster)" }));
+  await user.click(await screen.findByRole("button", { name: "Optimise for demand (Webster)" }));
   expect(await screen.findByText("cycle 60 s (was 40 s)")).toBeTruthy();
   await user.click(screen.getByText("Green wave along several lights"));
   expect(screen.getByRole("button", { name: "Coordinate two lights or more" })).toHaveProperty(
@@ -132,9 +132,9 @@ test("timing gives turns arrows, too, if that is switched on", async () => {
     }),
   });
   const { user } = show(panel(program(), editing, ["10", "11"]));
-  await user.click(await screen.findByRole("button", { name: "Time it after the demand (Webster)" }));
+  await user.click(await screen.findByRole("button", { name: "Optimise for demand (Webster)" }));
   expect(webster).toHaveBeenLastCalledWith("one", 3, ["10"], false);
-  await user.click(screen.getByRole("switch", { name: /^With arrows for turns/ }));
+  await user.click(screen.getByRole("switch", { name: /^Add protected turns/ }));
   await user.click(screen.getByRole("button", { name: "Time all 2 lights" }));
   expect(webster).toHaveBeenLastCalledWith("one", 3, [], true);
   webster.mockRestore();

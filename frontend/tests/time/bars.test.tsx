@@ -100,7 +100,7 @@ function bar(time: number, live = false) {
 
 test("the bar of a run says what is now, and its buttons jump to the events", async () => {
   const { user, onSeek, onShow } = bar(15);
-  expect(screen.getByRole("status").textContent).toContain("0:15.0 car-1 began rule brakes");
+  expect(screen.getByRole("status").textContent).toContain("0:15.0 car-1 triggered rule brakes");
   expect(screen.getByText("car-1: 2.0 s to van-2")).toBeTruthy();
   expect(screen.getByText("1 green, 1 red")).toBeTruthy();
   expect(screen.getByRole("button", { name: "Event before" }).hasAttribute("disabled")).toBe(true);

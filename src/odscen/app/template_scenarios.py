@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from odscen.app.maps import load_map
@@ -9,6 +10,7 @@ from odscen.app.scenarios import SUFFIX, write_scenario
 from odscen.base.errors import ConflictError
 from odscen.base.given_files import as_path
 from odscen.maps.folder_names import check_name
+from odscen.scenario.templates.scene_sites import NoPlaceError
 from odscen.scenario.templates.template_registry import TEMPLATES, find_template, place_template
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from odscen.base.given_files import GivenPath
+    from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import Workspace
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.templates.scene_template import SceneTemplate
@@ -80,6 +83,56 @@ def template_scenario(
         values=values or {},
         name=name or f"{template}-{map_name}",
     )
+
+
+def why_no_room(
+    workspace: Workspace,
+    template: str,
+    map_name: str,
+    *,
+    values: Mapping[str, float] | None = None,
+) -> str:
+    """Say why a map has no room for a template, before it is placed.
+
+    Parameters
+    ----------
+    values
+        As in :func:`template_scenario`.
+
+    Returns
+    -------
+    str
+        Where was looked and why not; empty if there is room.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such template or map.
+    InputError
+        If a number is unknown or out of its range.
+    """
+    wanted = tuple(sorted((values or {}).items()))
+    return _why_no_room(find_template(template), workspace.map(map_name), wanted)
+
+
+@lru_cache(maxsize=1024)
+def _why_no_room(
+    template: SceneTemplate, entry: MapEntry, values: tuple[tuple[str, float], ...]
+) -> str:
+    """Look once for each map as it is and numbers: it takes up to seconds."""
+    loaded = load_map(entry)
+    try:
+        place_template(
+            template,
+            loaded.sumo.graph,
+            loaded.usable,
+            loaded.lights,
+            values=dict(values),
+            name=template.name,
+        )
+    except NoPlaceError as error:
+        return str(error)
+    return ""
 
 
 def write_template(

@@ -118,9 +118,9 @@ COLUMNS: Final[dict[str, Column]] = {
     for column in (
         _make_column("collision", "", "Whether there was a collision"),
         _make_column("impact_speed", "m/s", "Speed of the hardest impact"),
-        _make_column("min_ttc", "s", "Least time to collision"),
-        _make_column("min_pet", "s", "Least post-encroachment time"),
-        _make_column("max_drac", "m/s2", "Most braking needed to avoid a crash"),
+        _make_column("min_ttc", "s", "Minimum TTC"),
+        _make_column("min_pet", "s", "Minimum post-encroachment time"),
+        _make_column("max_drac", "m/s2", "Maximum deceleration required to avoid a crash"),
         _make_column("clearance", "m", "Least distance of two bodies", search_only=True),
         _make_column("conflict_distance", "m", "Distance from a conflict point", search_only=True),
     )

@@ -203,7 +203,7 @@ FORMAT = Format(
     title="OpenSCENARIO",
     label="OpenSCENARIO XML of actors and rules, with --version 1.0 to 1.3",
     description="Road users and rules for esmini, ScenarioRunner and others, with the map beside "
-    "them. SUMO's traffic does not travel.",
+    "them. SUMO traffic is not exported.",
     of=("scenario", "run"),
     suffixes=(".xosc", ".xml"),
     read=read_openscenario,

@@ -37,7 +37,7 @@ _STATUS_LABELS = {
     ActorStatus.ARRIVED: "arrived",
     ActorStatus.RUNNING: "still under way",
     ActorStatus.WAITING: "not inserted",
-    ActorStatus.STRANDED: "stranded by a closure",
+    ActorStatus.STRANDED: "blocked by closure",
 }
 
 

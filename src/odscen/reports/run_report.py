@@ -298,7 +298,7 @@ def _outcome_sentence(counts: Values) -> str:
         verb = "was" if counts["waiting"] == 1 else "were"
         parts.append(f"{counts['waiting']:,} {verb} not inserted")
     if counts["stranded"]:
-        parts.append(f"{counts['stranded']:,} stranded by a closure")
+        parts.append(f"{counts['stranded']:,} blocked by closure")
     incidents = [
         f"{counts[key]:,} {word}"
         for key, word in (("teleported", "teleported"), ("collided", "collided"))

@@ -179,10 +179,24 @@ class NewScenario(RequestBody):
     values: Annotated[dict[Name, float], Field(max_length=40)] = {}
 
 
+class RoomQuestion(RequestBody):
+    """Whether a map has room for a template; ``values`` are numbers that differ from its own."""
+
+    map: Name
+    values: Annotated[dict[Name, float], Field(max_length=40)] = {}
+
+
+class RoomAnswer(Answer):
+    """``reason`` says why there is no room; it is empty where there is."""
+
+    reason: str
+
+
 class TemplateNumber(Answer):
     """A number of a template; ``usual`` ``null`` follows from the others, as ``meaning`` says."""
 
     name: str
+    title: str
     usual: float | None
     low: float
     high: float

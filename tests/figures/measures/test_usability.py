@@ -66,7 +66,7 @@ def test_a_run_with_a_gridlock_is_not_usable_and_says_where() -> None:
     assert (reason.kind, reason.value, reason.count) == (UsabilityKind.GRIDLOCK, 300.0, 1)
     assert reason.places == ("e_0 (x 12 m, y 34 m)",)
     assert verdict.headline.startswith(
-        "not usable: gridlock that did not dissolve, first at e_0 (x 12 m, y 34 m) since 700 s"
+        "not usable: unresolved gridlock, first at e_0 (x 12 m, y 34 m) since 700 s"
     )
 
 

@@ -143,3 +143,11 @@ def test_signals_that_are_all_the_maps_leave_no_attribute() -> None:
 
 def test_the_same_scenario_gives_the_same_text() -> None:
     assert to_graphml(example(), GRAPH) == to_graphml(example(), GRAPH)
+
+
+def test_the_size_of_a_body_is_kept() -> None:
+    one = Actor.model_validate(
+        {"id": "a", "category": "car", "spawn": NODES[0], "size": {"length": 1.0, "width": 1.0}}
+    )
+    scenario = example().model_copy(update={"actors": (one,), "flows": ()})
+    assert from_graphml(to_graphml(scenario, GRAPH)).actors == (one,)

@@ -29,7 +29,7 @@ export const goalTool = (id: string): Tool => ({
       hint: (hover) =>
         hover?.is === "place"
           ? t`${id} goes to ${placeWord(editing.graph, hover.place.id)}`
-          : t`Point at where ${id} goes`,
+          : t`Choose the destination of ${id}`,
       pick: (at) => {
         if (one && take(editing, one, at)) editing.done();
       },

@@ -76,8 +76,8 @@ export const NEXT_POINT = localized(() => t`Use the next free point`);
 /** What is said beside the map of a tool that makes something new. */
 export const startHelp = (who: string, walks: boolean): string =>
   walks
-    ? t`Now click where the ${who} starts: a yellow point on the map. Escape stops placing.`
-    : t`Now click where the ${who} starts: a blue point on the map. Escape stops placing.`;
+    ? t`Now click where the ${who} starts, on a sidewalk or crosswalk. Escape stops placing.`
+    : t`Now click where the ${who} starts, on a lane. Escape stops placing.`;
 
 /** What is said on the map of a tool that makes something new. */
 export const startPrompt = (who: string, walks: boolean): string =>

@@ -79,7 +79,7 @@ export const waypointTool = (id: string): Tool => ({
       hint: (hover) =>
         hover?.is === "place"
           ? t`${id} passes ${placeWord(editing.graph, hover.place.id)}`
-          : t`Point at where the route of ${id} is to pass`,
+          : t`Choose a via point for ${id}`,
       pick: (at) => {
         if (one && take(editing, one, at, slot(at))) editing.done();
       },

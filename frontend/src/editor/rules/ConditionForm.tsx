@@ -13,10 +13,10 @@ import { type About, FieldInput } from "./FieldInput";
 const JOIN_WORD = localized((): Record<Join, string> => ({
   all: t`All of several hold`,
   any: t`Any of several holds`,
-  not: t`Something does not hold`,
+  not: t`Not (negation)`,
 }));
 const isJoin = (kind: string): kind is Join => kind in JOIN_WORD();
-const EDGE = localized(() => ({ none: t`As long as it is true`, rising: t`Only as it becomes true` }));
+const EDGE = localized(() => ({ none: t`While true`, rising: t`When it becomes true` }));
 
 type ConditionProps = About & {
   others: readonly string[];

@@ -74,10 +74,10 @@ export function ThenForm({
               <Button
                 size="compact-sm"
                 variant="default"
-                aria-label={t`At the same time as ${inSentence(label)}`}
+                aria-label={t`Add parallel action to ${inSentence(label)}`}
                 onClick={() => put(n, [...items, fresh()])}
               >
-                <Trans>At the same time</Trans>
+                <Trans>Add parallel action</Trans>
               </Button>
               {then.length > 1 && (
                 <ListButtons
@@ -94,7 +94,7 @@ export function ThenForm({
         );
       })}
       <Button size="compact-sm" variant="default" onClick={() => onChange([...then, [fresh()]])}>
-        <Trans>Then another action</Trans>
+        <Trans>Add next action</Trans>
       </Button>
     </>
   );

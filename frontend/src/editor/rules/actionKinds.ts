@@ -76,7 +76,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   cut_in: {
     label: t`Cut in`,
     only: "vehicles",
-    fields: [TO(), OVER(), number("gap", t`Gap in the end`, " m", undefined, { min: 0.1 })],
+    fields: [TO(), OVER(), number("gap", t`Final gap`, " m", undefined, { min: 0.1 })],
     words: (v) =>
       t`cut in before ${text(v.to)} over ${amount(v.over, "s")}` + maybe(v.gap, t` with a gap of`, "m"),
   },
@@ -114,13 +114,12 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
       },
     ],
     words: (v) => {
-      const how = isStep(v)
-        ? t`at once`
-        : given(v.rate)
-          ? t`at ${amount(v.rate, "m/s²")}`
-          : given(v.over)
-            ? t`over ${amount(v.over, "s")}`
-            : t`within ${amount(v.within, "m")}`;
+      if (isStep(v)) return t`set speed to ${amount(v.to, "km/h", 3.6)}`;
+      const how = given(v.rate)
+        ? t`at ${amount(v.rate, "m/s²")}`
+        : given(v.over)
+          ? t`over ${amount(v.over, "s")}`
+          : t`within ${amount(v.within, "m")}`;
       return t`reach ${amount(v.to, "km/h", 3.6)} ${how}${v.shape === "cosine" ? t`, smoothly` : ""}`;
     },
   },
@@ -300,9 +299,9 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
     words: (v) => (v.by === "sumo" ? t`be driven by SUMO` : t`keep speed and lane, whatever is in the way`),
   },
   own: {
-    label: t`Of an installed package`,
+    label: t`From a plug-in`,
     fields: OWN(),
-    words: (v) => t`do ${text(v.kind)} of an installed package`,
+    words: (v) => t`do ${text(v.kind)} of a plug-in`,
   },
 }));
 

@@ -18,6 +18,7 @@ import {
   place,
   text,
   TO,
+  type Values,
   whose,
 } from "./fields";
 
@@ -69,7 +70,7 @@ export const CONDITION_KINDS = localized((): Record<ConditionKind, Kind> => ({
       },
       bound(" m", 20),
       { is: "choice", name: "along", label: t`Measured`, choices: ALONG() },
-      { is: "flag", name: "free", label: t`Between the bodies, not their centres`, otherwise: true },
+      { is: "flag", name: "free", label: t`Bumper to bumper`, otherwise: true },
       OF(),
     ],
     words: (v) => {
@@ -147,11 +148,15 @@ export const CONDITION_KINDS = localized((): Record<ConditionKind, Kind> => ({
     words: (v, actor) => t`${whose(v, actor)} is off the road`,
   },
   own: {
-    label: t`Of an installed package`,
+    label: t`From a plug-in`,
     fields: [...OWN(), OF()],
-    words: (v) => t`${text(v.kind)} of an installed package holds`,
+    words: (v) => t`${text(v.kind)} of a plug-in holds`,
   },
 }));
 
 export const conditionKind = (kind: string): Kind | undefined =>
   (CONDITION_KINDS() as Partial<Record<string, Kind>>)[kind];
+
+/** The moment from which a condition on time holds, for the beginning of a sentence. */
+export const momentWords = (v: Values): string =>
+  hasClock() && typeof v.after === "number" ? t`At ${clock(v.after)}` : t`At t = ${amount(v.after, "s")}`;

@@ -3,7 +3,7 @@ import { t } from "@lingui/core/macro";
 import { short } from "../../language/numbers";
 import type { EditOf, ScenarioDocument } from "../../api/types";
 import { actionKind, canDo } from "./actionKinds";
-import { conditionKind } from "./conditionKinds";
+import { conditionKind, momentWords } from "./conditionKinds";
 import { type Field, given, type Kind, type PlainField, type Values } from "./fields";
 
 export type Rule = ScenarioDocument["rules"][number];
@@ -137,10 +137,16 @@ export function sentence({ actor, when, then, times }: Draft): string {
   const wait = delay > 0 ? t`, ${short(delay, 2)} s later` : "";
   const acts = then
     .map((items) =>
-      items.map(({ kind, values }) => actionKind(kind)?.words(values, actor) ?? kind).join(t` and at once `),
+      items
+        .map(({ kind, values }) => actionKind(kind)?.words(values, actor) ?? kind)
+        .join(t` and at the same time `),
     )
     .join(t`, then `);
-  return t`When ${first}${wait}, ${acts}${times > 1 ? t`, up to ${times} times` : ""}.`;
+  const often = times > 1 ? t`, up to ${times} times` : "";
+  // A moment that is reached once is said as one.
+  if (!isGroup(when) && when.kind === "time" && delay === 0 && edge === "none")
+    return t`${momentWords(when.values)}, ${acts}${often}.`;
+  return t`When ${first}${wait}, ${acts}${often}.`;
 }
 
 // New parts

@@ -114,7 +114,7 @@ export const movement = (): PlainField => ({
 export const OF = localized((): Field => ({
   is: "actor",
   name: "of",
-  label: t`Whose (its own if empty)`,
+  label: t`Measured for (default: this actor)`,
   optional: true,
 }));
 export const TO = localized((): Field => ({ is: "actor", name: "to", label: t`Other road user` }));

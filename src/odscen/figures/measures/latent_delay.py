@@ -73,7 +73,7 @@ FIGURES = (
         tolerance="5 % or 0.5 s",
         display=CLOCK,
         section=ReportSection.KEY_FIGURES,
-        note="waited for room to depart",
+        note="waited to enter",
         on_page=True,
         compute=_mean_latent,
     ),

@@ -108,7 +108,7 @@ FIGURES = (
     RunFigure(
         name="stranded",
         unit="",
-        label="stranded by a closure",
+        label="blocked by closure",
         definition="Actors taken out because a measure had closed every route to their goal.",
         source="odscen, measures",
         better=Better.LOWER,

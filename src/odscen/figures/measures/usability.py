@@ -252,7 +252,7 @@ def _judge_gridlock(
     level = BOUNDS[UsabilityKind.GRIDLOCK].level(longest if lasting else 1.0)
     if closed:
         level = UsabilityLevel.NOT_USABLE
-    what = "gridlock that did not dissolve" if closed else "jam that did not dissolve"
+    what = "unresolved gridlock" if closed else "unresolved queue"
     if not lasting:
         what = "gridlock that dissolved"
     number = f"{len(named)} times {what}" if len(named) > 1 else what
@@ -334,7 +334,7 @@ def _judge_latent_delay(outcomes: Sequence[ActorOutcome], end: float) -> Usabili
     if value is None:
         return None
     late = sum(wait > 0.0 for wait in waits)
-    words = f"vehicles waited {value:.1f} s on average for room to depart (latent delay)"
+    words = f"vehicles waited {value:.1f} s on average to enter (latent delay)"
     level = BOUNDS[UsabilityKind.LATENT_DELAY].level(value)
     return UsabilityReason(UsabilityKind.LATENT_DELAY, level, value, late, words)
 

@@ -70,7 +70,9 @@ class IntelligentDriver:
     gap: float = offered(2.0, "Gap at standstill, m", low=0.0, high=50.0)
     politeness: float = offered(0.2, "Politeness of lane changes", low=0.0, high=1.0)
     threshold: float = offered(0.2, "Least gain of a lane change, m/s²", low=0.0, high=10.0)
-    safe_braking: float = offered(3.0, "Most braking of a new follower, m/s²", low=0.0, high=10.0)
+    safe_braking: float = offered(
+        3.0, "Maximum deceleration of a new follower, m/s²", low=0.0, high=10.0
+    )
     spread: float = offered(
         0.0, "Deviation of desired speeds", low=0.0, high=0.5,
         meaning="share of the limit; 0 for SUMO's alone",

@@ -355,7 +355,7 @@ def _read_from_nodes(graph: nx.MultiDiGraph, prefix: str, model: type[_One]) -> 
         fields["spawn"], fields["goal"] = str(node), _goal_of_node(graph, node)
         if "id" not in fields:
             fields["id"] = next(free)
-        for name in {"mix", "via"} & fields.keys():
+        for name in {"mix", "via", "size"} & fields.keys():
             fields[name] = _from_json(name, fields[name])
         yield _validate_fields(model, fields)
 

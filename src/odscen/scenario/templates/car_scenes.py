@@ -122,14 +122,20 @@ CUT_IN = SceneTemplate(
     "other one's and the time of the lane change are odscen's choice.",
     needs="two lanes of one direction",
     parameters=(
-        TemplateParameter("ego_speed", 60 / 3.6, 2, 60, "m/s", "speed of the ego"),
-        TemplateParameter("speed", 40 / 3.6, 1, 58, "m/s", "speed of the vehicle that cuts in"),
+        TemplateParameter("ego_speed", 60 / 3.6, 2, 60, "m/s", "speed of the ego", "Ego speed"),
+        TemplateParameter(
+            "speed", 40 / 3.6, 1, 58, "m/s",
+            "speed of the vehicle that cuts in", "Cut-in vehicle speed",
+        ),
         TemplateParameter(
             "ttc", None, 0.1, 10, "s",
             "time to collision when it is 0.3 m over the border; default: the limit of UN R157",
+            "Time to collision",
         ),
-        TemplateParameter("over", 3, 1, 10, "s", "duration of the lane change"),
-        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it"),
+        TemplateParameter(
+            "over", 3, 1, 10, "s", "duration of the lane change", "Lane-change duration"
+        ),
+        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it", "Lead time"),
     ),
     place=_cut_in,
 )  # fmt: skip
@@ -185,10 +191,22 @@ LEAD_BRAKES = SceneTemplate(
     "braking with 2 or 6 m/s2.",
     needs="a lane between junctions",
     parameters=(
-        TemplateParameter("speed", 50 / 3.6, 2, 60, "m/s", "speed of both"),
-        TemplateParameter("gap", 40, 2, 200, "m", "free gap"),
-        TemplateParameter("deceleration", 6, 0.5, 12, "m/s2", "of the lead vehicle"),
-        TemplateParameter("approach", 4, 3, 20, "s", "time before it, in which the gap settles"),
+        TemplateParameter(
+            "speed", 50 / 3.6, 2, 60, "m/s", "speed of both", "Speed of both vehicles"
+        ),
+        TemplateParameter("gap", 40, 2, 200, "m", "free gap", "Gap"),
+        TemplateParameter(
+            "deceleration",
+            6,
+            0.5,
+            12,
+            "m/s2",
+            "of the lead vehicle",
+            "Deceleration of the lead vehicle",
+        ),
+        TemplateParameter(
+            "approach", 4, 3, 20, "s", "time before it, in which the gap settles", "Lead time"
+        ),
     ),
     place=_lead_brakes,
 )
@@ -245,12 +263,18 @@ BUS_LEAVES = SceneTemplate(
     source="No protocol: the numbers are odscen's choice.",
     needs="two lanes of one direction",
     parameters=(
-        TemplateParameter("ego_speed", 40 / 3.6, 2, 60, "m/s", "speed of the ego"),
-        TemplateParameter("ttc", 5, 1, 20, "s", "time to collision at which the bus starts"),
-        TemplateParameter("speed", 30 / 3.6, 3, 20, "m/s", "speed that the bus reaches"),
-        TemplateParameter("acceleration", 1.2, 0.3, 3, "m/s2", "of the bus"),
-        TemplateParameter("over", 5, 2, 12, "s", "duration of the lane change"),
-        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it"),
+        TemplateParameter("ego_speed", 40 / 3.6, 2, 60, "m/s", "speed of the ego", "Ego speed"),
+        TemplateParameter(
+            "ttc", 5, 1, 20, "s", "time to collision at which the bus starts", "Time to collision"
+        ),
+        TemplateParameter(
+            "speed", 30 / 3.6, 3, 20, "m/s", "speed that the bus reaches", "Bus speed"
+        ),
+        TemplateParameter("acceleration", 1.2, 0.3, 3, "m/s2", "of the bus", "Bus acceleration"),
+        TemplateParameter(
+            "over", 5, 2, 12, "s", "duration of the lane change", "Lane-change duration"
+        ),
+        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it", "Lead time"),
     ),
     place=_bus_scene,
 )

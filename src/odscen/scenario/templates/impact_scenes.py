@@ -83,11 +83,19 @@ STATIONARY = SceneTemplate(
     "or 100 %, from a time to collision of 4 s on.",
     needs="a straight lane between junctions",
     parameters=(
-        TemplateParameter("ego_speed", 50 / 3.6, 2, 60, "m/s", "speed of the ego"),
+        TemplateParameter("ego_speed", 50 / 3.6, 2, 60, "m/s", "speed of the ego", "Ego speed"),
         TemplateParameter(
-            "overlap", 0.5, 0.1, 1, "", "share of the ego's width that the target is in front of"
+            "overlap",
+            0.5,
+            0.1,
+            1,
+            "",
+            "share of the ego's width that the target is in front of",
+            "Overlap",
         ),
-        TemplateParameter("ttc", 4, 1, 20, "s", "time to collision at the start"),
+        TemplateParameter(
+            "ttc", 4, 1, 20, "s", "time to collision at the start", "Time to collision"
+        ),
     ),
     place=_place_stationary,
 )
@@ -140,13 +148,18 @@ BICYCLE_AHEAD = SceneTemplate(
     "bicycle at 20 km/h for a hit at 25 % of the width and at 15 km/h at 50 %.",
     needs="a straight lane between junctions",
     parameters=(
-        TemplateParameter("ego_speed", 50 / 3.6, 2, 60, "m/s", "speed of the ego"),
-        TemplateParameter("bicycle_speed", 20 / 3.6, 1, 12, "m/s", "speed of the bicycle"),
+        TemplateParameter("ego_speed", 50 / 3.6, 2, 60, "m/s", "speed of the ego", "Ego speed"),
+        TemplateParameter(
+            "bicycle_speed", 20 / 3.6, 1, 12, "m/s", "speed of the bicycle", "Bicycle speed"
+        ),
         TemplateParameter(
             "hit", 0.25, 0.1, 0.9, "",
             "share of the ego's width, from the side of the kerb, at which it would be hit",
+            "Impact point",
         ),
-        TemplateParameter("ttc", 4, 1, 20, "s", "time to collision at the start"),
+        TemplateParameter(
+            "ttc", 4, 1, 20, "s", "time to collision at the start", "Time to collision"
+        ),
     ),
     place=_bicycle_ahead,
 )  # fmt: skip
@@ -211,13 +224,23 @@ CUT_OUT = SceneTemplate(
     "vehicle ahead leaves is odscen's choice.",
     needs="two lanes of one direction",
     parameters=(
-        TemplateParameter("ego_speed", 60 / 3.6, 2, 60, "m/s", "speed of the ego"),
-        TemplateParameter("headway", 1.5, 0.3, 5, "s", "time headway to the vehicle ahead"),
+        TemplateParameter("ego_speed", 60 / 3.6, 2, 60, "m/s", "speed of the ego", "Ego speed"),
         TemplateParameter(
-            "ttc", 4, 1.5, 10, "s", "time to collision with the target at which it leaves the lane"
+            "headway", 1.5, 0.3, 5, "s", "time headway to the vehicle ahead", "Time headway"
         ),
-        TemplateParameter("over", 3, 1, 10, "s", "duration of the lane change"),
-        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it"),
+        TemplateParameter(
+            "ttc",
+            4,
+            1.5,
+            10,
+            "s",
+            "time to collision with the target at which it leaves the lane",
+            "Time to collision",
+        ),
+        TemplateParameter(
+            "over", 3, 1, 10, "s", "duration of the lane change", "Lane-change duration"
+        ),
+        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it", "Lead time"),
     ),
     place=_cut_out,
 )
@@ -295,9 +318,11 @@ DRIFT = SceneTemplate(
     "with a vehicle in the next lane as in Euro NCAP's emergency lane keeping (0.3 to 0.6 m/s).",
     needs="two lanes of one direction",
     parameters=(
-        TemplateParameter("ego_speed", 65 / 3.6, 2, 60, "m/s", "speed of both"),
-        TemplateParameter("lateral_speed", 0.5, 0.1, 2, "m/s", "speed at which the ego drifts"),
-        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it"),
+        TemplateParameter("ego_speed", 65 / 3.6, 2, 60, "m/s", "speed of both", "Ego speed"),
+        TemplateParameter(
+            "lateral_speed", 0.5, 0.1, 2, "m/s", "speed at which the ego drifts", "Lateral speed"
+        ),
+        TemplateParameter("approach", 2, 0.5, 20, "s", "time before it", "Lead time"),
     ),
     place=_place_drift,
 )

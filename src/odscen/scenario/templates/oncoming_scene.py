@@ -193,16 +193,44 @@ ONCOMING = SceneTemplate(
     source="No protocol: the numbers are odscen's choice.",
     needs="a road with one lane for each direction",
     parameters=(
-        TemplateParameter("ego_speed", 40 / 3.6, 2, 40, "m/s", "speed of the ego"),
-        TemplateParameter("speed", 40 / 3.6, 2, 40, "m/s", "speed that the overtaking car reaches"),
-        TemplateParameter("slow_speed", 18 / 3.6, 1, 12, "m/s", "speed of the bicycle"),
-        TemplateParameter("acceleration", 2.5, 0.5, 6, "m/s2", "of the overtaking car"),
-        TemplateParameter("gap", 8, 3, 50, "m", "free gap to the bicycle before and after"),
-        TemplateParameter("over", 2, 1, 6, "s", "duration of each change of side"),
+        TemplateParameter("ego_speed", 40 / 3.6, 2, 40, "m/s", "speed of the ego", "Ego speed"),
         TemplateParameter(
-            "margin", 1, -2, 20, "s", "time to collision with the ego when it is back in its lane"
+            "speed",
+            40 / 3.6,
+            2,
+            40,
+            "m/s",
+            "speed that the overtaking car reaches",
+            "Overtaking car speed",
         ),
-        TemplateParameter("approach", 3.5, 2, 20, "s", "time before it, in which the gap settles"),
+        TemplateParameter(
+            "slow_speed", 18 / 3.6, 1, 12, "m/s", "speed of the bicycle", "Bicycle speed"
+        ),
+        TemplateParameter(
+            "acceleration",
+            2.5,
+            0.5,
+            6,
+            "m/s2",
+            "of the overtaking car",
+            "Overtaking car acceleration",
+        ),
+        TemplateParameter("gap", 8, 3, 50, "m", "free gap to the bicycle before and after", "Gap"),
+        TemplateParameter(
+            "over", 2, 1, 6, "s", "duration of each change of side", "Lane-change duration"
+        ),
+        TemplateParameter(
+            "margin",
+            1,
+            -2,
+            20,
+            "s",
+            "time to collision with the ego when it is back in its lane",
+            "Final time to collision",
+        ),
+        TemplateParameter(
+            "approach", 3.5, 2, 20, "s", "time before it, in which the gap settles", "Lead time"
+        ),
     ),
     place=_oncoming_scene,
 )

@@ -221,10 +221,22 @@ RED_LIGHT = SceneTemplate(
     needs="a traffic light with movements straight on from two legs that cross",
     parameters=(
         TemplateParameter(
-            "ego_speed", 25 / 3.6, 2, 12, "m/s", "speed of the ego where the paths cross"
+            "ego_speed",
+            25 / 3.6,
+            2,
+            12,
+            "m/s",
+            "speed of the ego where the paths cross",
+            "Ego speed",
         ),
         TemplateParameter(
-            "speed", 50 / 3.6, 3, 30, "m/s", "speed of the other vehicle where the paths cross"
+            "speed",
+            50 / 3.6,
+            3,
+            30,
+            "m/s",
+            "speed of the other vehicle where the paths cross",
+            "Speed of the other vehicle",
         ),
     ),
     place=_red_light,

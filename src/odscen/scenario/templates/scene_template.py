@@ -26,7 +26,10 @@ NO_COLLISION = "collided(ego) == 0"
 
 
 class TemplateParameter(NamedTuple):
-    """A number of a template; ``default`` ``None`` follows from the others, as ``meaning`` says."""
+    """A number of a template; ``default`` ``None`` follows from the others, as ``meaning`` says.
+
+    ``title`` is what forms call it.
+    """
 
     name: str
     default: float | None
@@ -34,6 +37,7 @@ class TemplateParameter(NamedTuple):
     high: float
     unit: str
     meaning: str
+    title: str
 
 
 class TemplateSite(NamedTuple):

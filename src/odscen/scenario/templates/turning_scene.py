@@ -188,9 +188,13 @@ TURNING = SceneTemplate(
     "5 km/h, hit at 50 % of the width.",
     needs="a junction with a turn, and a sidewalk on either side of the road behind it",
     parameters=(
-        TemplateParameter("ego_speed", 15 / 3.6, 2, 12, "m/s", "speed of the ego"),
-        TemplateParameter("walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian"),
-        TemplateParameter("approach", 1, 0.2, 20, "s", "time before the pedestrian starts"),
+        TemplateParameter("ego_speed", 15 / 3.6, 2, 12, "m/s", "speed of the ego", "Ego speed"),
+        TemplateParameter(
+            "walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian", "Pedestrian speed"
+        ),
+        TemplateParameter(
+            "approach", 1, 0.2, 20, "s", "time before the pedestrian starts", "Lead time"
+        ),
     ),
     place=_place_turning,
 )

@@ -183,12 +183,18 @@ _SPEEDS = (
         30,
         "m/s",
         "speed of the ego; default: the highest of 40, 35, 30, 25 and 20 km/h that has room",
+        "Ego speed",
     ),
-    TemplateParameter("walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian"),
-    TemplateParameter("approach", 2, 0.5, 20, "s", "time before the pedestrian starts"),
+    TemplateParameter(
+        "walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian", "Pedestrian speed"
+    ),
+    TemplateParameter(
+        "approach", 2, 0.5, 20, "s", "time before the pedestrian starts", "Lead time"
+    ),
     TemplateParameter(
         "hit", 0.5, 0.1, 0.9, "",
         "share of the ego's width, from the side of the pedestrian, at which it would be hit",
+        "Impact point",
     ),
 )  # fmt: skip
 
@@ -203,7 +209,7 @@ HIDDEN_CHILD = SceneTemplate(
         *_SPEEDS,
         TemplateParameter(
             "clearance", 1, 0.3, 5, "m",
-            "least distance from the front of the stopped vehicle to the child's path",
+            "least distance from the front of the stopped vehicle to the child's path", "Clearance",
         ),
     ),
     place=_child_scene,
@@ -308,18 +314,40 @@ VAN_AND_WALKER = SceneTemplate(
     source="No protocol: the numbers are odscen's choice.",
     needs="two lanes of one direction, and a sidewalk on either side of the road",
     parameters=(
-        TemplateParameter("ego_speed", 6, 2, 30, "m/s", "speed of the ego"),
-        TemplateParameter("van_speed", 3, 1, 28, "m/s", "speed of the van before it changes lanes"),
+        TemplateParameter("ego_speed", 6, 2, 30, "m/s", "speed of the ego", "Ego speed"),
         TemplateParameter(
-            "ttc", 3, 0.5, 10, "s", "time to collision with the van at which it changes lanes"
+            "van_speed", 3, 1, 28, "m/s", "speed of the van before it changes lanes", "Van speed"
         ),
-        TemplateParameter("over", 2, 1, 10, "s", "duration of the lane change"),
-        TemplateParameter("acceleration", 2, 0, 5, "m/s2", "of the van as it changes lanes"),
         TemplateParameter(
-            "distance", 30, 2, 100, "m", "from the ego's front to the pedestrian who starts"
+            "ttc",
+            3,
+            0.5,
+            10,
+            "s",
+            "time to collision with the van at which it changes lanes",
+            "Time to collision",
         ),
-        TemplateParameter("walking_speed", 1, 0.5, 4, "m/s", "speed of the pedestrian"),
-        TemplateParameter("approach", 2, 0.5, 20, "s", "time before the van changes lanes"),
+        TemplateParameter(
+            "over", 2, 1, 10, "s", "duration of the lane change", "Lane-change duration"
+        ),
+        TemplateParameter(
+            "acceleration", 2, 0, 5, "m/s2", "of the van as it changes lanes", "Van acceleration"
+        ),
+        TemplateParameter(
+            "distance",
+            30,
+            2,
+            100,
+            "m",
+            "from the ego's front to the pedestrian who starts",
+            "Distance to the pedestrian",
+        ),
+        TemplateParameter(
+            "walking_speed", 1, 0.5, 4, "m/s", "speed of the pedestrian", "Pedestrian speed"
+        ),
+        TemplateParameter(
+            "approach", 2, 0.5, 20, "s", "time before the van changes lanes", "Lead time"
+        ),
     ),
     place=_van_and_walker,
 )
@@ -399,11 +427,23 @@ REVERSING = SceneTemplate(
     "5 km/h, hit at 50 % of the width.",
     needs="a sidewalk on either side of a road, away from crosswalks",
     parameters=(
-        TemplateParameter("reversing_speed", 4 / 3.6, 0.3, 6, "m/s", "speed of the ego"),
-        TemplateParameter("walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian"),
-        TemplateParameter("approach", 2, 0.5, 20, "s", "time before the pedestrian starts"),
         TemplateParameter(
-            "beyond", 1, 0, 10, "s", "time that it reverses on behind the pedestrian's path"
+            "reversing_speed", 4 / 3.6, 0.3, 6, "m/s", "speed of the ego", "Ego speed"
+        ),
+        TemplateParameter(
+            "walking_speed", CHILD, 0.5, 4, "m/s", "speed of the pedestrian", "Pedestrian speed"
+        ),
+        TemplateParameter(
+            "approach", 2, 0.5, 20, "s", "time before the pedestrian starts", "Lead time"
+        ),
+        TemplateParameter(
+            "beyond",
+            1,
+            0,
+            10,
+            "s",
+            "time that it reverses on behind the pedestrian's path",
+            "Time behind the path",
         ),
     ),
     place=_place_reversing,

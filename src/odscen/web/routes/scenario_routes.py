@@ -15,7 +15,7 @@ from starlette.responses import Response
 
 from odscen.app.maps import load_map
 from odscen.app.scenarios import SUFFIX
-from odscen.app.template_scenarios import template_scenario
+from odscen.app.template_scenarios import template_scenario, why_no_room
 from odscen.app.variants import apply_edit
 from odscen.base.categories import Category
 from odscen.base.errors import InputError, LimitError, NotFoundError
@@ -46,6 +46,8 @@ from odscen.web.messages import (
     Path,
     ProblemInfo,
     RoiInfo,
+    RoomAnswer,
+    RoomQuestion,
     ScenarioRow,
     ScenarioState,
     TemplateInfo,
@@ -125,6 +127,7 @@ def list_templates() -> list[TemplateInfo]:
             numbers=[
                 TemplateNumber(
                     name=number.name,
+                    title=number.title,
                     usual=number.default,
                     low=number.low,
                     high=number.high,
@@ -136,6 +139,14 @@ def list_templates() -> list[TemplateInfo]:
         )
         for template in TEMPLATES.values()
     ]
+
+
+@templates.post("/{template}/room")
+def find_room(template: str, asked: RoomQuestion, shared: Shared) -> RoomAnswer:
+    """Whether a map has room for a template, before a scenario is made of it."""
+    with shared.search:
+        reason = why_no_room(shared.workspace, template, asked.map, values=asked.values)
+    return RoomAnswer(reason=reason)
 
 
 @router.post("", status_code=201)
