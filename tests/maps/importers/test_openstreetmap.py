@@ -869,3 +869,34 @@ def test_a_tunnel_is_below_the_street_above_it_and_a_bridge_over_water_stays_lev
             lowest[road.name] = min(lowest[road.name], float(line.z.min()))
             assert line.z.max() < 0.01
     assert lowest == {"deep": pytest.approx(-6.0, abs=0.01), "above": 0.0}
+
+
+def test_islands_lie_between_the_directions_and_bus_stops_at_their_place() -> None:
+    square = {20: (20.0, 20.0), 21: (24.0, 20.0), 22: (24.0, 26.0), 23: (20.0, 26.0)}
+    nodes = CROSS | square | {6: (0.0, 60.0), 7: (60.0, 0.0), 8: (-70.0, -7.0)}
+    ways: dict[int, tuple[list[int], dict[str, str]]] = {
+        10: ([2, 6, 1], {"highway": "tertiary", "name": "north"}),
+        11: ([3, 7, 1], {"highway": "tertiary", "name": "east", "oneway": "yes"}),
+        12: ([4, 1], {"highway": "tertiary"}),
+        13: ([5, 1], {"highway": "tertiary", "name": "west"}),
+        30: ([20, 21, 22, 23, 20], {"area:highway": "traffic_island"}),
+    }
+    island = {"highway": "crossing", "crossing:island": "yes"}
+    stop = {"highway": "bus_stop", "name": "Town hall"}
+    odr, entries = imported(place_of(nodes, ways, node_tags={6: island, 7: island, 8: stop}))
+    table = RoadTable.of(odr)
+    found = [(r, o) for r, road in odr.roads.items() for o in road.objects]
+    islands = [(odr.roads[r].name, o) for r, o in found if o.type == "trafficIsland"]
+    # One on each side of the crosswalk, on the line between the directions; cars pass beside.
+    north = [o for name, o in islands if name == "north" and o.width == 1.2]
+    walk = next(o for r, o in found if o.type == "crosswalk" and odr.roads[r].name == "north")
+    assert sorted(round(o.s - walk.s, 3) for o in north) == [-2.5, 2.5]
+    assert all(o.t == pytest.approx(0.0, abs=1e-9) for o in north)
+    assert len(islands) == 3
+    said = {(e.source_id, e.outcome.value) for e in entries if "island" in e.reason}
+    assert said == {("node 6", "guessed"), ("node 7", "lost"), ("way 30", "guessed")}
+    road, pole = next((r, o) for r, o in found if o.type == "pole")
+    assert pole.name == "Bus stop Town hall"
+    (outline,) = object_outline(table, road, pole)
+    assert np.hypot(*(outline[:, :2].mean(axis=0) - (-70.0, -7.0))) < 0.3
+    assert [e.outcome.value for e in entries if e.source_id == "node 8"] == ["guessed"]

@@ -43,6 +43,10 @@ FIRST_JUNCTION = 1_000_000
 """Id of the first junction: CARLA confuses a junction with a road of the same id."""
 CROSSWALK = 3.0
 """Metres of a crosswalk along its street (RASt 06: 3 to 4 m)."""
+ISLAND_WIDTH = 1.2
+"""Metres of an island in the middle of a street, where no lane gives it room: cars drive beside."""
+ISLAND_LENGTH = 2.0
+ISLAND_HEIGHT = 0.15
 KERB_GAP = 0.5
 """Metres between a junction and a crosswalk before it."""
 STOP_GAP = 1.0
@@ -398,8 +402,7 @@ def _place_crosswalks(
         else:
             drawn.note(ElementOutcome.KEPT, where, kind, crossing.confidence, crossing.source)
         if crossing.island:
-            reason = "crossing: its island is not drawn; pedestrians cross in one go"
-            drawn.note(ElementOutcome.LOST, where, reason, 0.8, crossing.source)
+            _note_island(plan, s, where, crossing.source, drawn)
         for at_end in (False, True):
             leg = Leg(street.number, at_end)
             back = (length - s if at_end else s) + CROSSWALK / 2
@@ -415,6 +418,43 @@ def _edges_at(plan: RoadPlan, s: float) -> tuple[float, float]:
     right = sum(k.lane.width for k in section.right if k.lane.kind not in beside)
     left = sum(k.lane.width for k in section.left if k.lane.kind not in beside)
     return section.offset - right, section.offset + left
+
+
+def _note_island(plan: RoadPlan, s: float, where: str, source: str, drawn: _Drawn) -> None:
+    """Draw the island of a crossing before and behind the crosswalk, and say what became of it."""
+    section = plan.section_at(s)
+    kinds = [{k.lane.kind for k in lanes} for lanes in (section.left, section.right)]
+    if not all(seen & {"driving", "bus"} for seen in kinds):
+        reason = "crossing: its island is not drawn, as traffic has one direction here"
+        drawn.note(ElementOutcome.LOST, where, reason, 0.8, source)
+        return
+    for side in (-1, 1):
+        at = s + side * (CROSSWALK / 2 + ISLAND_LENGTH / 2)
+        if at - ISLAND_LENGTH / 2 <= 0.0 or at + ISLAND_LENGTH / 2 >= plan.line.length:
+            continue
+        u, v = ISLAND_LENGTH / 2, ISLAND_WIDTH / 2
+        corners = tuple(
+            model.Corner(True, a, b, 0.0, ISLAND_HEIGHT)
+            for a, b in ((-u, -v), (u, -v), (u, v), (-u, v), (-u, -v))
+        )
+        plan.objects.append(
+            _draw_object(
+                drawn,
+                "trafficIsland",
+                "Island",
+                at,
+                plan.section_at(at).offset,
+                length=ISLAND_LENGTH,
+                width=ISLAND_WIDTH,
+                height=ISLAND_HEIGHT,
+                outlines=(model.Outline(corners, True, True),),
+            )
+        )
+    reason = (
+        f"crossing: its island of {ISLAND_WIDTH:g} m is drawn between the directions; "
+        "pedestrians cross in one go"
+    )
+    drawn.note(ElementOutcome.GUESSED, where, reason, 0.5, source)
 
 
 def _paint_crosswalk(plan: RoadPlan, s: float, drawn: _Drawn) -> None:
@@ -450,6 +490,7 @@ def _draw_object(
     length: float,
     width: float,
     orientation: str = "none",
+    height: float = 0.0,
     outlines: tuple[model.Outline, ...] = (),
 ) -> model.RoadObject:
     return model.RoadObject(
@@ -466,7 +507,7 @@ def _draw_object(
         orientation=orientation,
         length=length,
         width=width,
-        height=0.0,
+        height=height,
         radius=None,
         valid_length=None,
         outlines=outlines,

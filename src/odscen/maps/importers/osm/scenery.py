@@ -31,6 +31,11 @@ STOREY = 3.2
 """Metres of a storey, where a building says how many it has but not how high it is."""
 LOW_BUILDING = 6.4
 TREE_HEIGHT = 8.0
+KERB = 0.15
+"""Metres of height of a traffic island."""
+POLE = 0.1
+POLE_HEIGHT = 3.0
+"""Metres of the sign of a bus stop."""
 CROWN = 2.5
 """Metres of the radius of a tree's crown, where nothing says it."""
 CLEARANCE = 6.0
@@ -64,7 +69,7 @@ def draw_scenery(
     plans: Mapping[int, RoadPlan],
     new_object: Callable[[], str],
 ) -> list[SceneryRow]:
-    """Add buildings and trees to the nearest roads, as objects with an outline.
+    """Add buildings, trees, islands and bus stops to the nearest roads, as objects.
 
     A building that reaches over a street, as above a passage, is left out: it would stand on it.
     """
@@ -97,6 +102,8 @@ def draw_scenery(
         height = _read_metres(node.tags.get("height", "")) or TREE_HEIGHT
         if _add_object(roads, tree, outline, "tree", node.tags, height, new_object):
             counts["tree"] += 1
+    rows += _draw_islands(extract, network, roads, tree, new_object)
+    rows += _draw_bus_stops(extract, network, roads, tree, new_object)
     if counts["building"]:
         reason = (
             f"{counts['building']} buildings within {SIGHT:g} m of a road, the height of "
@@ -107,6 +114,51 @@ def draw_scenery(
         reason = f"{counts['tree']} trees within {SIGHT:g} m of a road"
         rows.append(SceneryRow(True, "trees", reason, 0.8, None))
     return rows
+
+
+def _draw_islands(
+    extract: Extract,
+    network: StreetNetwork,
+    roads: Sequence[RoadPlan],
+    tree: shapely.STRtree,
+    new_object: Callable[[], str],
+) -> Iterator[SceneryRow]:
+    """Add areas that are traffic islands, each with what became of it."""
+    for way in sorted(extract.ways.values()):
+        if way.tags.get("area:highway") != "traffic_island":
+            continue
+        source = f"way {way.id}"
+        for _, ring, tags in _close_ring(source, way.nodes, way.tags, network):
+            outline = np.asarray(ring.exterior.coords)[:-1]
+            kept = _add_object(roads, tree, outline, "trafficIsland", tags, KERB, new_object)
+            reason = "traffic island" if kept else f"traffic island: no road within {SIGHT:g} m"
+            yield SceneryRow(kept, source, reason, 0.8, source)
+
+
+def _draw_bus_stops(
+    extract: Extract,
+    network: StreetNetwork,
+    roads: Sequence[RoadPlan],
+    tree: shapely.STRtree,
+    new_object: Callable[[], str],
+) -> Iterator[SceneryRow]:
+    """Add the poles of bus stops, with their names; OpenDRIVE has stops of railways only."""
+    for node in sorted(extract.nodes.values()):
+        if node.tags.get("highway") != "bus_stop" or node.id not in network.places:
+            continue
+        source = f"node {node.id}"
+        angles = np.arange(8) * math.pi / 4
+        place = np.array(network.places[node.id])
+        outline = place + POLE / 2 * np.column_stack([np.cos(angles), np.sin(angles)])
+        name = " ".join(["Bus stop", node.tags.get("name", "")]).strip()
+        tags = {**node.tags, "name": name}
+        kept = _add_object(roads, tree, outline, "pole", tags, POLE_HEIGHT, new_object)
+        reason = (
+            "bus stop: its pole; lines and their stops are of a scenario"
+            if kept
+            else f"bus stop: no road within {SIGHT:g} m"
+        )
+        yield SceneryRow(kept, source, reason, 0.8, source)
 
 
 def _find_buildings(
