@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,14 +25,16 @@ VEHICLES = 4800
 
 
 @pytest.fixture(scope="module")
-def workspace(one_map: Path) -> Workspace:
-    opened = Workspace.open(one_map)
+def workspace(one_map: Path, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
+    root = tmp_path_factory.mktemp("reports") / "workspace"
+    shutil.copytree(one_map, root)
+    opened = Workspace.open(root)
     opened.add_map(SHIPPED / f"{TOWN}.xodr")
     return opened
 
 
 def _study(workspace: Workspace) -> Scenario:
-    """A town for half an hour, with departures for all of it."""
+    """A town for an hour, with departures for all of it."""
     graph = load_map(workspace.map(TOWN)).sumo.graph
     scenario = edits.new_scenario(graph, name="study", roi=graph.segments.ids)
     scenario = edits.set_background(scenario, graph, background="all", trips=VEHICLES)
