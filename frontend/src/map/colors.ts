@@ -101,7 +101,7 @@ export const INDICATOR = "#ff9900";
 export const UNUSABLE = "#8b949d";
 /** Detectors of the traffic light that is looked at. */
 export const DETECTOR = "#2f6fb5";
-/** White signs are read on them; told apart from each other and from kinds of road users. */
+/** White signs are read on them; distinct from each other and from kinds of road users. */
 export const MARK_COLOR: Record<MarkKind, string> = {
   collision: "#c32d3c",
   braking: "#873c1e",
