@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from odscen.app.running.runs import run
 from odscen.app.scenarios import check_scenario, read_scenario
 from odscen.app.template_scenarios import template_scenario, write_template
 from odscen.base.errors import ConflictError, InputError, NotFoundError
@@ -106,3 +107,18 @@ def test_a_template_is_written_once_under_a_name(workspace: Workspace, tmp_path:
 def test_an_unknown_template_is_refused_with_those_there_are(workspace: Workspace) -> None:
     with pytest.raises(NotFoundError, match="did you mean cut-in"):
         template_scenario(workspace, "cutin", "town_5x5")
+
+
+@pytest.mark.slow
+def test_a_drift_leaves_its_lane_when_the_side_of_the_body_is_over_the_border(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    """From 2 s on at 0.5 m/s: 0.975 m to the border of a lane of 3.75 m, so after 1.95 s."""
+    scenario = template_scenario(workspace, "drift", map_name="motorway_weave", name="drift")
+    result = run(workspace, scenario, out=tmp_path / "runs")
+    rows = {row["criterion"]: row for row in result.summary["criteria"]}
+    left = rows["lane_departure(ego) <= 0 m"]
+    hit = rows["collided(ego) == 0"]["time"]
+    assert not left["passed"]
+    assert left["time"] == pytest.approx(3.95, abs=0.11)  # the next record
+    assert left["value"] >= 0.5 * (hit - 3.95) - 0.06

@@ -126,6 +126,7 @@ export const SERVER_TEXTS: Readonly<Record<string, MessageDescriptor>> = {
   "in collisions": msg`in collisions`,
   "inserted": msg`inserted`,
   "instant of firing": msg`instant of firing`,
+  "lane departure": msg`lane departure`,
   "largest insertion error": msg`largest insertion error`,
   "least distance from the front of the stopped vehicle to the child's path": msg`least distance from the front of the stopped vehicle to the child's path`,
   "longest depart delay": msg`longest depart delay`,

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from odscen.figures.judging.actor_measures import RunRecords
+from odscen.figures.judging.lane_departure import DrivenLanes
 from odscen.figures.measures.summary import actors_from_json
 from odscen.records.replay import body_centres
 from odscen.records.run_events import events_from_json
 from odscen.records.run_plan import Plan
 from odscen.runs import layout
+from odscen.runs.net_facts import read_net_facts
 from odscen.runs.recorded import read_conflicts, trajectory_files
 
 if TYPE_CHECKING:
@@ -32,7 +36,21 @@ def read_judged(folder: Path) -> RunRecords:
         read_conflicts(folder),
         lambda actor: _read_speeds(folder, actor),
         lambda actor: _read_bodies(folder, actor),
+        lambda: _read_lanes(folder),
     )
+
+
+def _read_lanes(folder: Path) -> DrivenLanes | None:
+    facts = read_net_facts(folder)
+    if facts is None:
+        return None
+    plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
+    offset = np.array(plan.net_offset)
+    follows: dict[str, list[str]] = {}
+    for lane, following in facts.follows.iter_rows():
+        follows.setdefault(lane, []).append(following)
+    shapes = {name: facts.shapes[name] - offset for name in facts.widths}
+    return DrivenLanes(shapes, facts.widths, follows)
 
 
 def _read_speeds(folder: Path, actor: str) -> pl.DataFrame | None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import polars as pl
 import pytest
 
@@ -13,6 +14,7 @@ from odscen.figures.judging.expectations import (
     needs_criticality,
     parse_expectation,
 )
+from odscen.figures.judging.lane_departure import DrivenLanes
 from odscen.figures.measures.conflicts import conflict_table
 from odscen.figures.measures.summary import Trip, actor_outcomes
 from odscen.records.run_events import Event, EventKind
@@ -58,12 +60,14 @@ BODIES = {
     )
     for name, x in (("hero", [0.0, 4.0]), ("van", [14.0, 10.0]))
 }  # fmt: skip
+LANES = DrivenLanes({"lane": np.array([[-50.0, 0.0], [50.0, 0.0]])}, {"lane": 3.5}, {})
 RECORDS = RunRecords(
     actor_outcomes(PLAN, EVENTS, {"hero": Trip(4.0, 1.5, 1)}),
     EVENTS,
     CONFLICTS,
     lambda actor: SPEEDS if actor == "hero" else None,
     BODIES.get,
+    lambda: LANES,
 )
 SUMMARY = {
     "actors": {"planned": 2, "arrived": 1, "collided": 2},
@@ -94,6 +98,8 @@ def rows(*criteria: str, records: RunRecords = RECORDS) -> Sequence[dict[str, ob
         ("stopped(hero) == 1", 0.0, False, None),
         ("max_deceleration(hero) <= 3", 0.0, True, 3.0),
         ("max_jerk(hero) <= 5", 7.0, False, 2.0),
+        ("lane_departure(hero) <= 0.5 m", 2.25, False, 2.0),
+        ("lane_departure(van) <= 0", 2.25, False, 2.0),
         ("min_distance(hero,van) >= 3 m", 2.0, False, 2.0),
         ("min_distance(ego,bus) >= 3 m", None, False, None),
         ("stopped_before(hero,van) >= 3 m", None, False, None),

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from odscen.base.categories import Category
+from odscen.figures.judging.lane_departure import lane_departures
 from odscen.figures.measures.conflicts import SEEN_DRAC, SEEN_PET, SEEN_TTC
 from odscen.figures.measures.figure import Basis, Better, Figure
 from odscen.records.outcomes import ActorStatus
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from odscen.figures.judging.lane_departure import DrivenLanes
     from odscen.figures.measures.summary import ActorOutcome
     from odscen.records.run_events import Event
     from odscen.scenario.story.road_view import ActorView
@@ -49,6 +52,8 @@ class RunRecords:
     bodies
         ``time`` (s), ``x``, ``y`` (m) and ``hdg`` (rad) of the centre of an actor's body, and its
         ``length`` and ``width`` (m), by its id, in order of time; ``None`` as there.
+    lanes
+        Lanes of vehicles; ``None`` of a run without a network of SUMO's.
     """
 
     outcomes: Sequence[ActorOutcome] = ()
@@ -56,6 +61,7 @@ class RunRecords:
     conflicts: pl.DataFrame | None = None
     speeds: Callable[[str], pl.DataFrame | None] = lambda _: None
     bodies: Callable[[str], pl.DataFrame | None] = lambda _: None
+    lanes: Callable[[], DrivenLanes | None] = lambda: None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -215,6 +221,22 @@ def _comes_to_standstill(records: RunRecords, outcome: ActorOutcome) -> Measured
     moved = np.maximum.accumulate(speeds >= _STOPPED)
     stood = np.flatnonzero(moved & (speeds < _STOPPED))
     return Measured(1.0, float(times[stood[0]])) if stood.size else Measured(0.0)
+
+
+def _furthest_departure(records: RunRecords, outcome: ActorOutcome) -> Measured | None:
+    bodies, lanes = records.bodies(outcome.id), records.lanes()
+    if bodies is None or lanes is None or outcome.category == Category.PEDESTRIAN:
+        return None
+    found = lane_departures(bodies, lanes)
+    if not found:
+        return None
+    beyond = np.array([one.beyond for one in found])
+    furthest = int(beyond.argmax())
+    if beyond[furthest] <= 0.0:
+        return Measured(0.0)
+    before = np.flatnonzero(beyond[:furthest] <= 0.0)
+    begin = int(before[-1]) + 1 if before.size else 0
+    return Measured(float(beyond[furthest]), found[begin].time)
 
 
 def _shortest_distance(records: RunRecords, outcome: ActorOutcome, other: str) -> Measured | None:
@@ -455,6 +477,15 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         source="trajectories",
         better=Better.LOWER,
         compute=_highest_jerk,
+    ),
+    ActorMeasure(
+        name="lane_departure",
+        unit="m",
+        label="lane departure",
+        definition="How far the body of a vehicle was beyond the border of its lane, at most.",
+        source="trajectories; lanes of the SUMO network",
+        better=Better.LOWER,
+        compute=_furthest_departure,
     ),
 )
 """In the order in which they are offered."""

@@ -301,7 +301,7 @@ def _place_drift(site: TemplateSite, values: Mapping[str, float]) -> TemplateSce
                 f"of its lane, {centre - width:.2f} m to the other vehicle. The rule lane-left "
                 f"fires when its side is over the border."
             ),
-            criteria=("fired(lane-left) == 0", NO_COLLISION),
+            criteria=("fired(lane-left) == 0", "lane_departure(ego) <= 0 m", NO_COLLISION),
         )
 
     metres = _REAR + length + speed * (values["approach"] + 4.0 / aside) + _BEYOND
