@@ -10,7 +10,8 @@ as ever, and so it does to all on its own side, to those who turn into the same 
 
 A step costs little, for most vehicles are not looked at: how far the next such turn of a route is
 says when a vehicle can be there at the earliest, and nobody asks for it before; who waits at red is
-not asked, and the geometry of a turn is found when the first vehicle comes that makes it.
+not asked, nor who waits for one that comes, until that one can be there; and the geometry of a turn
+is found when the first vehicle comes that makes it.
 """
 
 from __future__ import annotations
@@ -45,6 +46,8 @@ _LONGEST_STEP = 0.5
 """Seconds of a step up to which this is done; with steps of 1 s some touched."""
 _NEAR = 20.0
 """Metres before a stop line from which on a driver looks for a gap."""
+_AT_LINE = 5.0
+"""Metres before the stop line from which on one is looked at who waits inside the junction only."""
 _SIGHT = 90.0
 """Metres before their stop line from which on those who come are looked at."""
 _OPPOSING = math.radians(120.0)
@@ -59,6 +62,8 @@ _FIRMLY, _HARDEST = 3.0, 7.0
 """m/s2 with which it brakes for that, and at most."""
 _CREEPING = 0.3
 """m/s below which one who turns waits."""
+_STILL = 0.01
+"""m/s below which it stands."""
 _STANDING = 2.0
 """m/s below which it is not sure that one who is in the junction leaves it."""
 _WIDTH = 2.1
@@ -120,9 +125,10 @@ class _Turn:
 
     That is a place inside the junction, or else the stop line. ``speed`` is that of the lane behind
     it, m/s; ``light`` names the traffic light, empty without one, and ``index`` the link there.
-    ``approaches`` are the lanes from which others come, each with the paths that it leads over, the
-    metres from its begin to the stop lines there, and whether it is inside the junction. ``inside``
-    are its own lanes there, with the metres before each, and ``near`` who passes beside it.
+    ``approaches`` are the lanes from which others come, each with the paths that it leads over and
+    the metres from its begin to the stop lines there, and ``crossed`` those of others inside the
+    junction. ``inside`` are its own lanes there, with the metres before each, and ``near`` who
+    passes beside it.
     """
 
     waiting: str
@@ -130,14 +136,20 @@ class _Turn:
     speed: float
     light: str
     index: int
-    approaches: tuple[tuple[str, tuple[tuple[_Crossing, float, bool], ...]], ...]
+    approaches: _Approaches
+    crossed: _Approaches
     inside: dict[str, float]
     near: tuple[_NearPath, ...]
+
+
+_Approaches = tuple[tuple[str, tuple[tuple[_Crossing, float], ...]], ...]
+"""Lanes, each with the paths that it leads over and the metres from its begin to the stop lines."""
 
 
 class _Route(NamedTuple):
     """A route by its name: the edge after each, turns by the place in it of the edge before.
 
+    ``near`` are the metres before the end of that edge from which on one is looked at.
     ``metres`` and ``seconds`` are those from its begin to the end of each edge, at least, the
     latter at the limit. Of a route that comes by an edge twice, ``after`` is ``None``.
     """
@@ -146,6 +158,7 @@ class _Route(NamedTuple):
     after: dict[str, str] | None
     places: list[int]
     turns: list[dict[str, _Turn | None]]
+    near: list[float]
     metres: list[float]
     seconds: list[float]
 
@@ -203,6 +216,8 @@ class TurningGaps:
         self._due_of: dict[str, int] = {}
         self._edges: dict[str, tuple[float, float]] = {}
         self._near: dict[str, tuple[str, dict[str, _Turn | None]]] = {}
+        self._waiting: dict[str, tuple[_Turn | None, int]] = {}
+        self._on_lanes: dict[str, tuple[str, ...]] = {}
         self._held: list[str] = []
 
     def before_step(
@@ -226,7 +241,10 @@ class TurningGaps:
         if not self._near:
             return
         lights: dict[str, str] = {}
+        self._on_lanes.clear()
         for name, (route, lanes) in list(self._near.items()):
+            if name in self._waiting and self._still_waits(name, lights):
+                continue
             try:
                 lane = self._lane_of(name)
             except self._errors:  # it has arrived
@@ -243,9 +261,13 @@ class TurningGaps:
             elif self._body_of(name).length > _LONGEST:
                 if lane == turn.waiting and self._may_go(turn, lane, lights):
                     self._passed_by(name, turn)  # it takes SUMO's gaps, and waits for bodies
-            elif lane != turn.waiting:
-                self._set_ignored(name, self._passed_on_way(name, turn))
+            elif lane in turn.inside and lane != turn.waiting:
+                if any(self._list_on(crossed) for crossed, _ in turn.crossed):
+                    self._set_ignored(name, self._passed_on_way(name, turn))
             elif not self._may_go(turn, lane, lights):
+                self._set_ignored(name, ())
+                self._waiting[name] = turn, self._step
+            elif lane != turn.waiting:  # it waits inside the junction
                 self._set_ignored(name, ())
             elif self._route_name_of(name) != route:
                 self._forget_vehicle(name)
@@ -301,8 +323,10 @@ class TurningGaps:
         for name in self._due.pop(self._step, ()):
             if self._due_of.get(name) == self._step:
                 del self._due_of[name]
-                with suppress(*self._errors):  # it may be gone
+                try:
                     self._look_at(name)
+                except self._errors:  # it is gone
+                    continue
 
     def _plan_look(self, name: str, steps: int) -> None:
         due = self._step + steps
@@ -326,7 +350,8 @@ class TurningGaps:
         again = _LOOK_AGAIN
         if number < len(route.places):
             place, passed = route.places[number], index if inside else index - 1
-            rest = route.metres[place] - (route.metres[passed] if passed >= 0 else 0.0) - _NEAR
+            near = route.near[number]
+            rest = route.metres[place] - (route.metres[passed] if passed >= 0 else 0.0) - near
             rest -= 0.0 if inside else self._position_of(name)
             if rest <= 0.0:
                 self._near[name] = route.name, route.turns[number]
@@ -336,7 +361,7 @@ class TurningGaps:
             driving = route.seconds[place] - route.seconds[index]
             if place > index:
                 last = route.seconds[place] - route.seconds[place - 1]
-                driving -= last * min(1.0, _NEAR / (route.metres[place] - route.metres[place - 1]))
+                driving -= last * min(1.0, near / (route.metres[place] - route.metres[place - 1]))
             again = min(again, max(gaining, driving / factor))
         self._plan_look(name, self._count_steps(again))
 
@@ -350,7 +375,7 @@ class TurningGaps:
             self._routes.clear()
         edges = self._route_of(name)
         after = dict(pairwise(edges)) if len(set(edges)) == len(edges) else None
-        known = _Route(route_name, after, [], [], [], [])
+        known = _Route(route_name, after, [], [], [], [], [])
         metres = seconds = 0.0
         for edge in edges:
             length, speed = self._find_shortest(edge)
@@ -364,12 +389,28 @@ class TurningGaps:
             if turns:
                 known.places.append(place)
                 known.turns.append(turns)
+                before = any(turn.waiting not in turn.inside for turn in turns.values() if turn)
+                known.near.append(_NEAR if before else _AT_LINE)
         self._routes[route_name] = known
         return known
 
     def _forget_vehicle(self, name: str) -> None:
         self._set_ignored(name, ())
         del self._near[name]
+        self._waiting.pop(name, None)
+
+    def _still_waits(self, name: str, lights: dict[str, str]) -> bool:
+        """Whether one who waited still does so in any case: at red, or for one who comes."""
+        at_red, until = self._waiting[name]
+        if at_red is not None:
+            if self._shows_red(at_red, lights):
+                return True
+        elif self._step < until:
+            with suppress(*self._errors):  # it may be gone
+                if self._speed_of(name) < _STILL:
+                    return True
+        del self._waiting[name]
+        return False
 
     def _may_go(self, turn: _Turn, lane: str, lights: dict[str, str]) -> bool:
         """Whether one who has not begun to turn is to look for a gap.
@@ -379,12 +420,15 @@ class TurningGaps:
         lights
             States of lights that have been asked for.
         """
-        if not turn.light or lane in self._lanes.internal:
-            return True
+        return lane in self._lanes.internal or not self._shows_red(turn, lights)
+
+    def _shows_red(self, turn: _Turn, lights: dict[str, str]) -> bool:
+        if not turn.light:
+            return False
         shown = lights.get(turn.light)
         if shown is None:
             shown = lights[turn.light] = self._state_of(turn.light)
-        return shown[turn.index] != _RED
+        return shown[turn.index] == _RED
 
     def _body_of(self, name: str) -> _Body:
         body = self._bodies.get(name)
@@ -409,12 +453,20 @@ class TurningGaps:
         """
         free = []
         corner = _CORNER if self._body_of(name).width > _WIDTH else 0.0
-        for other, passes, own in self._find_oncoming(name, turn, waits=True):
+        for other, rest, crossing, own in self._find_oncoming(name, turn, waits=True):
+            passes = self._time_passage(other, rest, crossing)
             behind = _BEHIND + (corner or _SIDE * (self._body_of(other).width > _WIDTH))
             if passes[0] <= own[1] and passes[1] + behind >= own[0]:
-                if passes[1] < math.inf and self._speed_of(name) < _STANDING:
+                speed = self._speed_of(name)
+                if passes[1] < math.inf and speed < _STANDING:
                     self._sumo.vehicle.setSpeed(name, 0.0)
                     self._held.append(name)
+                elif rest > 0.0 and speed < _STILL:
+                    # It stays in the way until it is in the junction, even if it stops before.
+                    latest, _ = self._time_passage(other, rest, crossing, stops=True)
+                    if latest <= own[1]:
+                        steps = int(self._time_to_line(other, rest) / self._step_length)
+                        self._waiting[name] = None, self._step + steps
                 return []
             free.append(other)
         return free
@@ -453,7 +505,8 @@ class TurningGaps:
         """
         free = [
             other
-            for other, passes, own in self._find_oncoming(name, turn, waits=False)
+            for other, rest, crossing, own in self._find_oncoming(name, turn, waits=False)
+            for passes in (self._time_passage(other, rest, crossing),)
             if passes[0] > own[1] or passes[1] + _BEHIND < own[0]
         ]
         given = self._given.get(name)
@@ -461,25 +514,31 @@ class TurningGaps:
 
     def _find_oncoming(
         self, name: str, turn: _Turn, *, waits: bool
-    ) -> Iterator[tuple[str, tuple[float, float], tuple[float, float]]]:
-        """Who comes, with its seconds and those of who turns to where paths cross, and past it."""
+    ) -> Iterator[tuple[str, float, _Crossing, tuple[float, float]]]:
+        """Who comes, with its metres to its stop line, its path, and the seconds of who turns."""
         times: dict[_Crossing, tuple[float, float]] = {}
-        on_lane, position_of = self._on_lane, self._position_of
-        for source, paths in turn.approaches:
-            for other in on_lane(source):
-                for crossing, to_line, inside in paths:
-                    if not inside and self._next_edge(other, crossing.pair[0]) != crossing.pair[1]:
-                        continue
-                    own = times.get(crossing)
-                    if own is None:
-                        own = times[crossing] = self._find_crossing(
-                            name, turn, crossing, waits=waits
-                        )
-                    yield (
-                        other,
-                        self._time_passage(other, to_line - position_of(other), crossing),
-                        own,
-                    )
+        for approaches, inside in ((turn.crossed, True), (turn.approaches, False)):
+            for source, paths in approaches:
+                for other in self._list_on(source):
+                    for crossing, to_line in paths:
+                        before, after = crossing.pair
+                        if not inside and self._next_edge(other, before) != after:
+                            continue
+                        own = times.get(crossing)
+                        if own is None:
+                            own = times[crossing] = self._find_crossing(
+                                name, turn, crossing, waits=waits
+                            )
+                        yield other, to_line - self._position_of(other), crossing, own
+            if not waits:  # who is not in the junction yet is nobody to stop for on the way
+                return
+
+    def _list_on(self, lane: str) -> tuple[str, ...]:
+        """Who is on a lane, asked for once in a step."""
+        there = self._on_lanes.get(lane)
+        if there is None:
+            there = self._on_lanes[lane] = self._on_lane(lane)
+        return there
 
     def _count_steps(self, seconds: float) -> int:
         """Whole steps, one at least."""
@@ -510,19 +569,33 @@ class TurningGaps:
         pairs = pairwise(edges[begin : begin + _EDGES])
         return next((after for before, after in pairs if before == edge), None)
 
-    def _time_passage(self, name: str, to_line: float, crossing: _Crossing) -> tuple[float, float]:
-        """Seconds to when a vehicle is where paths cross, at least, and to when it is past."""
+    def _time_passage(
+        self, name: str, to_line: float, crossing: _Crossing, *, stops: bool = False
+    ) -> tuple[float, float]:
+        """Seconds to when a vehicle is where paths cross, at least, and to when it is past.
+
+        Parameters
+        ----------
+        stops
+            As if it stood where it is.
+        """
         length, _, gains, factor = self._body_of(name)
-        speed, inside = self._speed_of(name), crossing.inside * factor
-        first = crossing.there[0]
+        inside, first = crossing.inside * factor, crossing.there[0]
         if to_line > 0.0:
-            limit = max(self._allowed_of(name), speed)
-            return _seconds(to_line, speed, gains, limit) + first / max(inside, 0.1), math.inf
+            waits = self._time_to_line(name, to_line, stops=stops)
+            return waits + first / max(inside, 0.1), math.inf
+        speed = self._speed_of(name)
         begins = _seconds(first + to_line, speed, gains, max(inside, speed))
         behind = crossing.there[1] + length + to_line
         if speed < _STANDING and behind > 0.0:  # it is not sure that it goes on
             return begins, math.inf
         return begins, max(0.0, behind) / max(speed, 0.1)
+
+    def _time_to_line(self, name: str, metres: float, *, stops: bool = False) -> float:
+        """Seconds to when a vehicle is at its stop line, at least, or if it stood where it is."""
+        speed = 0.0 if stops else self._speed_of(name)
+        limit = max(self._allowed_of(name), speed)
+        return _seconds(metres, speed, self._body_of(name).gains, limit)
 
     # ------------------------------------------------------------------------ the network
 
@@ -586,30 +659,32 @@ class TurningGaps:
                     continue
                 inner = next((link[4] for link in links_of[via] if link[4]), "")
                 waiting, beyond = (via, inner) if inner else (source, via)
-                approaches = self._find_approaches(source, onto, beyond)
+                approaches, crossed = self._find_approaches(source, onto, beyond)
                 inside = {via: 0.0, inner: lane.getLength(via)} if inner else {via: 0.0}
                 near = self._find_near_paths(source, onto, [*inside])
-                if approaches or near:
+                if crossed or near:
                     turn = _Turn(
                         waiting,
                         lane.getLength(waiting),
                         lane.getMaxSpeed(beyond),
                         *self._find_lights.get(via, ("", 0)),
                         approaches,
+                        crossed,
                         inside,
                         near,
                     )
-                    found |= {waiting: turn, beyond: turn}
+                    found |= {source: turn, waiting: turn, beyond: turn}
         return {**dict.fromkeys(own), **found} if found else {}
 
     def _find_approaches(
         self, source: str, onto: str, beyond: str
-    ) -> tuple[tuple[str, tuple[tuple[_Crossing, float, bool], ...]], ...]:
-        """Lanes on which those come who cross a turn, as :class:`_Turn` has them."""
+    ) -> tuple[_Approaches, _Approaches]:
+        """Lanes on which those come who cross a turn, before and inside the junction."""
         lane = self._sumo.lane
         shape, edge_of, links_of = lane.getShape, lane.getEdgeID, self._lanes.links_of
         first, own = set(lane.getFoes(source, onto)), np.array(shape(beyond))
-        found: dict[str, list[tuple[_Crossing, float, bool]]] = defaultdict(list)
+        found: dict[str, list[tuple[_Crossing, float]]] = defaultdict(list)
+        crossed: dict[str, list[tuple[_Crossing, float]]] = defaultdict(list)
         for other, other_onto, via in self._find_entries[self._junction_behind(source)]:
             if other not in first or edge_of(other_onto) == edge_of(onto):
                 continue
@@ -624,11 +699,15 @@ class TurningGaps:
             crossing = _Crossing(pair, *touching, lane.getMaxSpeed(via))
             to_line = 0.0
             for part in parts:
-                found[part].append((crossing, to_line, True))
+                crossed[part].append((crossing, to_line))
                 to_line -= lane.getLength(part)
             for name, rest in self._list_upstream(other):
-                found[name].append((crossing, rest, False))
-        return tuple((name, tuple(paths)) for name, paths in found.items())
+                found[name].append((crossing, rest))
+        before, inside = (
+            tuple((name, tuple(paths)) for name, paths in lanes.items())
+            for lanes in (found, crossed)
+        )
+        return before, inside
 
     def _find_near_paths(self, source: str, onto: str, own: Sequence[str]) -> tuple[_NearPath, ...]:
         """Paths of those who turn towards a turn and pass beside it, nearer than bodies are wide.
@@ -756,8 +835,9 @@ def _find_touching_fronts(places: FloatArray, others: FloatArray) -> Any:
     across = np.column_stack([-ahead[:, 1], ahead[:, 0]])
     across *= 0.5 * _WIDTH / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     front = np.stack([places - across, places, places + across], axis=1)
-    apart = np.hypot(*np.moveaxis(front[:, :, None] - others[None, None], -1, 0))
-    return apart.min(axis=(1, 2)) <= 0.5 * _WIDTH
+    (x, y), (other_x, other_y) = np.moveaxis(front, -1, 0), others.T
+    squared = np.subtract.outer(x, other_x) ** 2 + np.subtract.outer(y, other_y) ** 2
+    return squared.min(axis=(1, 2)) <= (0.5 * _WIDTH) ** 2
 
 
 def _find_run(along: FloatArray, touches: Any, at: float) -> tuple[float, float]:
