@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bench.saturation import TURNS, build_without_crosswalks, count_entered
 from odscen.sumo.worker.simulation.session import open_session
 from odscen.sumo.worker.simulation.turning_gaps import TurningGaps
 from tests.convert.maps import converted, named
@@ -104,6 +105,15 @@ def test_a_bus_that_turns_waits_as_sumo_has_it(net: Path, tmp_path: Path) -> Non
     """Its sides leave its path in a turn, and it is long."""
     assert not turns_between(net, tmp_path, 9.0, kinds=("bus", "car"))
     assert turns_between(net, tmp_path, 15.0, kinds=("bus", "car"))
+
+
+def test_nobody_touches_in_an_hour_of_turns_off_a_major_road(tmp_path: Path) -> None:
+    """One who stood in its turn had let pass one who crept, and went when that one drove."""
+    turn = TURNS["left turn from the major road"]
+    net = build_without_crosswalks(turn.map, tmp_path)
+    oncoming, turned, collisions = count_entered(tmp_path, net, turn, 600, "0.5", 1)
+    assert (oncoming, collisions) == (602.0, 0.0)
+    assert turned > 0.9 * turn.capacity(oncoming)
 
 
 STRAIGHT = "1.0.f 1.1.f 3.1.b 3.0.b"

@@ -501,16 +501,16 @@ class TurningGaps:
     def _passed_on_way(self, name: str, turn: _Turn) -> Collection[str]:
         """Those whom one who turns need not wait for.
 
-        To change its mind would be to stop in the way.
+        To change its mind would be to stop in the way, but for one who stands before that.
         """
-        free = [
-            other
-            for other, rest, crossing, own in self._find_oncoming(name, turn, waits=False)
-            for passes in (self._time_passage(other, rest, crossing),)
-            if passes[0] > own[1] or passes[1] + _BEHIND < own[0]
-        ]
-        given = self._given.get(name)
-        return given.union(free) if given else free
+        free, drives = set(self._given.get(name, ())), self._speed_of(name) >= _CREEPING
+        for other, rest, crossing, own in self._find_oncoming(name, turn, waits=False):
+            passes = self._time_passage(other, rest, crossing)
+            if passes[0] > own[1] or passes[1] + _BEHIND < own[0]:
+                free.add(other)
+            elif not drives and own[0] > 0.0:
+                free.discard(other)
+        return free
 
     def _find_oncoming(
         self, name: str, turn: _Turn, *, waits: bool
