@@ -25,7 +25,11 @@ from odscen.experiments.studies import (
     study_results,
     study_state,
 )
-from odscen.experiments.study_page import study_groups, write_study_page
+from odscen.experiments.study_page import (
+    difference_sentences,
+    study_groups,
+    write_study_page,
+)
 from odscen.experiments.work import LocalExecutor
 from odscen.figures.measures.registry import RUN_FIGURES
 from odscen.runs.run_settings import RunSettings
@@ -168,6 +172,14 @@ def test_the_report_pairs_runs_of_variants_by_seed(begun: Path) -> None:
     page = write_study_page(begun, ["mean_speed"], begun / "study.html").read_text("utf-8")
     assert "1 of 10 runs failed" in page
     assert "out of luck" in page
+    (sentence,) = difference_sentences(begun, ["mean_speed"])
+    assert sentence in page
+    interval = found.figures["mean_speed"]
+    change = "rises" if interval.mean > 0.0 else "falls"
+    clear = abs(interval.mean) > interval.half_width
+    assert sentence.startswith("slow, compared with as-designed: ")
+    assert (f"mean speed {change} by" in sentence) == clear
+    assert "4 pairs of runs" in sentence
     with pytest.raises(InputError, match="no figure of runs is called 'luck'"):
         study_groups(begun, ["luck"])
 

@@ -181,6 +181,7 @@ def report(
     from odscen.experiments.studies import PAGE_FILE
     from odscen.experiments.study_page import (
         SHOWN_FIGURES,
+        difference_sentences,
         study_groups,
         write_study_page,
     )
@@ -191,11 +192,13 @@ def report(
     if as_json:
         parts = {"means": means, "differences": differences}
         said = {name: [group.to_dict() for group in groups] for name, groups in parts.items()}
-        print_json({"file": str(file), **said})
+        print_json({"file": str(file), **said, "sentences": difference_sentences(study, figures)})
         return
     _show_groups("Means", means, figures)
     if differences:
         _show_groups("Differences from the first variant, by case and seed", differences, figures)
+    for sentence in difference_sentences(study, figures):
+        log(sentence)
     log(f"Page: {file}")
 
 

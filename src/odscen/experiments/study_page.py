@@ -8,6 +8,7 @@ does not count.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -178,10 +179,13 @@ def scenario_differences(out: Path, figures: Sequence[str]) -> list[StudyGroup]:
     InputError
         If there is no study, or no such figure.
     """
+    _refuse_unknown(figures)
+    return _pair_scenarios(_completed_rows(study_results(out).table), figures)
+
+
+def _pair_scenarios(own: pl.DataFrame, figures: Sequence[str]) -> list[StudyGroup]:
     import polars as pl
 
-    _refuse_unknown(figures)
-    own = _completed_rows(study_results(out).table)
     scenarios = own["scenario"].unique(maintain_order=True).to_list()
     if len(scenarios) < 2 or own.select("scenario", *_SHARED).is_duplicated().any():
         return []
@@ -189,6 +193,72 @@ def scenario_differences(out: Path, figures: Sequence[str]) -> list[StudyGroup]:
     others = own.filter(pl.col("scenario") != scenarios[0])
     return _group_figures(
         _format_paired(others, first, _SHARED, figures), figures, differences=True
+    )
+
+
+def difference_sentences(out: Path, figures: Sequence[str]) -> list[str]:
+    """What each scenario but the first did, and each variant but the first: a sentence each.
+
+    Raises
+    ------
+    InputError
+        If there is no study, or no such figure.
+    """
+    _refuse_unknown(figures)
+    return _say_differences(_completed_rows(study_results(out).table), figures)
+
+
+def _say_differences(own: pl.DataFrame, figures: Sequence[str]) -> list[str]:
+    scenarios, variants = (
+        own[name].unique(maintain_order=True).to_list() for name in ("scenario", "variant")
+    )
+    sentences = []
+    for group in _pair_scenarios(own, figures):
+        where = f" ({group.variant})" if len(variants) > 1 else ""
+        sentences.append(
+            f"{group.scenario}{where}, compared with {scenarios[0]}: {_say_group(group, figures)}."
+        )
+    for group in paired_differences(own, figures):
+        where = f"{group.scenario}, " if len(scenarios) > 1 else ""
+        sentences.append(
+            f"{where}{group.variant}, compared with {variants[0]}: {_say_group(group, figures)}."
+        )
+    return sentences
+
+
+def _say_group(group: StudyGroup, figures: Sequence[str]) -> str:
+    """The first figure that differs or might, and all others that clearly do."""
+    first, *others = figures
+    clear = [name for name in others if _differs(group.figures[name])]
+    return "; ".join(_say_figure(group.figures[name]) for name in (first, *clear))
+
+
+def _differs(found: Confidence) -> bool:
+    if found.mean is None or found.half_width is None:
+        return False
+    return abs(found.mean) > found.half_width
+
+
+def _say_figure(found: Confidence) -> str:
+    """``mean delay falls by 12.0 s (8.1 to 15.9; 10 pairs of runs), better``."""
+    figure = study_figures()[found.figure]
+    if found.mean is None or found.half_width is None:
+        return f"{figure.label} takes two pairs of runs to compare"
+    low, high = found.mean - found.half_width, found.mean + found.half_width
+    unit, pairs = f" {figure.unit}" if figure.unit else "", f"{found.seeds:,} pairs of runs"
+    digits = min(6, max(0, 1 - math.floor(math.log10(found.half_width or abs(found.mean) or 1.0))))
+    if not _differs(found):
+        return (
+            f"no clear difference of {figure.label} "
+            f"({low:.{digits}f} to {high:.{digits}f}{unit}; {pairs})"
+        )
+    rises = found.mean > 0.0
+    least, most = (low, high) if rises else (-high, -low)
+    better = figure.improves(found.mean)
+    return (
+        f"{figure.label} {'rises' if rises else 'falls'} by {abs(found.mean):.{digits}f}{unit} "
+        f"({least:.{digits}f} to {most:.{digits}f}; {pairs})"
+        f"{'' if better is None else ', better' if better else ', worse'}"
     )
 
 
@@ -212,6 +282,7 @@ def study_page(state: StudyState, table: pl.DataFrame, figures: Sequence[str]) -
     own = _completed_rows(table)
     parts = [
         _render_head(state),
+        _render_sentences(_say_differences(own, figures)),
         _render_section("Means", "means", _group_figures(own, figures), figures, _MEANS),
         _render_section(
             "Differences", "differences", paired_differences(own, figures), figures, _PAIRS
@@ -230,6 +301,10 @@ _PAIRS: Final = (
     "and 95 % confidence interval of the differences of runs with the same case and seed: an "
     "interval without 0 says that it matters."
 )
+_SENTENCES: Final = (
+    "the first figure, and others that differ clearly: the mean of the differences of runs with "
+    "the same seed, with its 95 % confidence interval."
+)
 _FAILURES: Final = "why runs failed, or were not possible, most frequent first."
 
 
@@ -246,6 +321,19 @@ def _render_head(state: StudyState) -> Markup:
         element("p", f"{state.runs:,} runs: {counts or 'none has ended'}."),
         verdict=verdict,
         style="bad" if bad else "fair" if left else "good",
+    )
+
+
+def _render_sentences(sentences: Sequence[str]) -> Markup | None:
+    if not sentences:
+        return None
+    more = len(sentences) - MOST_ROWS
+    return report_section(
+        "What each one did",
+        element("ul", *(element("li", sentence) for sentence in sentences[:MOST_ROWS])),
+        element("p", f"and {more:,} more in the table") if more > 0 else None,
+        explained=_SENTENCES,
+        ident="did",
     )
 
 
