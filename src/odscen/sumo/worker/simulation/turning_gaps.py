@@ -164,12 +164,21 @@ class _Route(NamedTuple):
 
 
 class _Body(NamedTuple):
-    """What never changes of a vehicle: length, width, m, acceleration, m/s2, factor on limits."""
+    """What never changes of a vehicle: m, acceleration, m/s2, factor on limits, top speed, m/s."""
 
     length: float
     width: float
     gains: float
     factor: float
+    fastest: float
+
+
+class _Passage(NamedTuple):
+    """Metres to the place where paths cross, and seconds to when one is there and has left it."""
+
+    metres: float
+    first: float
+    last: float
 
 
 class TurningGaps:
@@ -335,7 +344,7 @@ class TurningGaps:
 
     def _look_at(self, name: str) -> None:
         """Note a vehicle that is near a turn; else say when it may be, at the earliest."""
-        _, _, gains, factor = self._body_of(name)
+        _, _, gains, factor, _ = self._body_of(name)
         lane, index = self._lane_of(name), self._index_of(name)
         if not lane or index < 0:  # it is being teleported
             self._plan_look(name, self._count_steps(1.0))
@@ -437,7 +446,11 @@ class TurningGaps:
             if len(self._bodies) >= _MOST_KEPT:
                 self._bodies.clear()
             body = _Body(
-                of.getLength(name), of.getWidth(name), of.getAccel(name), of.getSpeedFactor(name)
+                of.getLength(name),
+                of.getWidth(name),
+                of.getAccel(name),
+                of.getSpeedFactor(name),
+                of.getMaxSpeed(name),
             )
             self._bodies[name] = body
         return body
@@ -452,24 +465,40 @@ class TurningGaps:
         angle, the two would touch beside that place, so it is held until they do not.
         """
         free = []
-        corner = _CORNER if self._body_of(name).width > _WIDTH else 0.0
+        given = self._given.get(name, ())
         for other, rest, crossing, own in self._find_oncoming(name, turn, waits=True):
             passes = self._time_passage(other, rest, crossing)
-            behind = _BEHIND + (corner or _SIDE * (self._body_of(other).width > _WIDTH))
-            if passes[0] <= own[1] and passes[1] + behind >= own[0]:
-                speed = self._speed_of(name)
-                if passes[1] < math.inf and speed < _STANDING:
-                    self._sumo.vehicle.setSpeed(name, 0.0)
-                    self._held.append(name)
-                elif rest > 0.0 and speed < _STILL:
-                    # It stays in the way until it is in the junction, even if it stops before.
-                    latest, _ = self._time_passage(other, rest, crossing, stops=True)
-                    if latest <= own[1]:
-                        steps = int(self._time_to_line(other, rest) / self._step_length)
-                        self._waiting[name] = None, self._step + steps
+            margin = 0.0 if other in given else MARGIN
+            if (
+                passes[0] <= own.last + margin
+                and passes[1] + self._room_behind(name, other) >= own.first
+            ):
+                if passes[1] < math.inf and self._speed_of(name) < _STANDING:
+                    self._slow_to(name, 0.0)
+                elif rest > 0.0:
+                    self._plan_waiting(name, other, rest, crossing, own)
                 return []
             free.append(other)
         return free
+
+    def _room_behind(self, name: str, other: str) -> float:
+        """Seconds that one who turns keeps behind one who is past the place where paths cross."""
+        if self._body_of(name).width > _WIDTH:
+            return _BEHIND + _CORNER
+        return _BEHIND + _SIDE * (self._body_of(other).width > _WIDTH)
+
+    def _plan_waiting(
+        self, name: str, other: str, rest: float, crossing: _Crossing, own: _Passage
+    ) -> None:
+        """Do not look at one who stands until the one that it waits for is in the junction.
+
+        That is so if the other stays in the way even if it stops before.
+        """
+        if self._speed_of(name) < _STILL:
+            latest, _ = self._time_passage(other, rest, crossing, stops=True)
+            if latest <= own.last + MARGIN:
+                steps = int(self._time_to_line(other, rest) / self._step_length)
+                self._waiting[name] = None, self._step + steps
 
     def _keep_off(self, name: str, turn: _Turn, before: float) -> None:
         """Have one who turns stop before it touches another who turns beside it.
@@ -491,32 +520,41 @@ class TurningGaps:
                         continue
                     waits = theirs < near.there[0] and self._speed_of(other) < _CREEPING
                     if theirs > near.there[0] or (near.goes_first and not waits):
-                        # As fast as it can still stop from after the step to come.
-                        rest, step = max(0.0, room - _APART), _FIRMLY * self._step_length
-                        slow = math.sqrt(step * step + 2.0 * _FIRMLY * rest) - step
-                        self._sumo.vehicle.setSpeed(name, min(slow, speed))
-                        self._held.append(name)
+                        self._stop_before(name, room, speed)
                         return
+
+    def _stop_before(self, name: str, metres: float, speed: float) -> None:
+        """Have one be as fast as it can still stop before a place after the step to come."""
+        rest, step = max(0.0, metres - _APART), _FIRMLY * self._step_length
+        self._slow_to(name, min(speed, math.sqrt(step * step + 2.0 * _FIRMLY * rest) - step))
+
+    def _slow_to(self, name: str, speed: float) -> None:
+        """Have one drive at a speed for a step."""
+        self._sumo.vehicle.setSpeed(name, speed)
+        self._held.append(name)
 
     def _passed_on_way(self, name: str, turn: _Turn) -> Collection[str]:
         """Those whom one who turns need not wait for.
 
-        To change its mind would be to stop in the way, but for one who stands before that.
+        It changes its mind while it can stop before the place where paths cross: there, it would
+        stop in the way.
         """
-        free, drives = set(self._given.get(name, ())), self._speed_of(name) >= _CREEPING
+        free, speed = set(self._given.get(name, ())), self._speed_of(name)
         for other, rest, crossing, own in self._find_oncoming(name, turn, waits=False):
             passes = self._time_passage(other, rest, crossing)
-            if passes[0] > own[1] or passes[1] + _BEHIND < own[0]:
+            if passes[0] > own.last or passes[1] + self._room_behind(name, other) < own.first:
                 free.add(other)
-            elif not drives and own[0] > 0.0:
+            elif own.metres > speed * speed / (2.0 * _FIRMLY):
                 free.discard(other)
+                if passes[1] < math.inf:
+                    self._stop_before(name, own.metres, speed)
         return free
 
     def _find_oncoming(
         self, name: str, turn: _Turn, *, waits: bool
-    ) -> Iterator[tuple[str, float, _Crossing, tuple[float, float]]]:
-        """Who comes, with its metres to its stop line, its path, and the seconds of who turns."""
-        times: dict[_Crossing, tuple[float, float]] = {}
+    ) -> Iterator[tuple[str, float, _Crossing, _Passage]]:
+        """Who comes, with its metres to its stop line, its path, and that of who turns."""
+        times: dict[_Crossing, _Passage] = {}
         for approaches, inside in ((turn.crossed, True), (turn.approaches, False)):
             for source, paths in approaches:
                 for other in self._list_on(source):
@@ -546,18 +584,16 @@ class TurningGaps:
 
     def _find_crossing(
         self, name: str, turn: _Turn, crossing: _Crossing, *, waits: bool
-    ) -> tuple[float, float]:
-        """Seconds to when who turns gets to where paths cross, and to when it has left, at least.
-
-        The margin is in the second of one who waits.
-        """
-        length, _, gains, factor = self._body_of(name)
+    ) -> _Passage:
+        """When who turns is where paths cross, at least."""
+        length, _, gains, factor, fastest = self._body_of(name)
         front = self._position_of(name) - (turn.length if waits else 0.0)
-        speed, limit = self._speed_of(name), turn.speed * factor
-        return (
-            _seconds(crossing.here[0] - front, speed, gains, limit),
-            _seconds(crossing.here[1] + length - front, speed, gains, limit)
-            + (MARGIN if waits else 0.0),
+        speed, limit = self._speed_of(name), min(turn.speed * factor, fastest)
+        metres = crossing.here[0] - front
+        return _Passage(
+            metres,
+            _seconds(metres, speed, gains, limit),
+            _seconds(crossing.here[1] + length - front, speed, gains, limit),
         )
 
     def _next_edge(self, name: str, edge: str) -> str | None:
@@ -579,8 +615,8 @@ class TurningGaps:
         stops
             As if it stood where it is.
         """
-        length, _, gains, factor = self._body_of(name)
-        inside, first = crossing.inside * factor, crossing.there[0]
+        length, _, gains, factor, fastest = self._body_of(name)
+        inside, first = min(crossing.inside * factor, fastest), crossing.there[0]
         if to_line > 0.0:
             waits = self._time_to_line(name, to_line, stops=stops)
             return waits + first / max(inside, 0.1), math.inf
