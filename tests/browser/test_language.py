@@ -78,7 +78,7 @@ def test_a_scenario_is_made_and_run_in_german(
     head = page.get_by_role("banner")
     head.get_by_role("button", name="Lauf starten", exact=True).click()
     expect(page.get_by_role("region", name="Ergebnis des Laufs")).to_be_visible(timeout=180_000)
-    expect(page.get_by_text("Der Lauf ist fertig")).to_be_visible()
+    expect(page.get_by_text("Lauf beendet")).to_be_visible()
     expect(page.get_by_text("Mittlere Reisezeit", exact=True)).to_be_visible()
     wrong += look(page, "result")
     assert "\n".join(wrong) == ""

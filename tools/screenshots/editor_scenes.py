@@ -50,7 +50,7 @@ def placing(studio: Studio) -> None:
         form = page.locator(".fold").filter(has=page.get_by_label("Placed by")).last
         form.evaluate("one => one.scrollIntoView({block: 'end'})")
         camera.take("fill", form)
-        page.get_by_role("button", name="Hide").click()
+        page.get_by_role("button", name="Hide", exact=True).click()
         user.names.first.click()
         expect(user.ego).to_be_visible()
         page.get_by_role("button", name="Choose on the map").click()

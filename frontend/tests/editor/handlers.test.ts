@@ -20,6 +20,7 @@ import { Picker } from "../../src/map/picking";
 import type { AskedRemoval } from "../../src/editor/uses";
 import { Heads } from "../../src/signals/heads";
 import { actor, flow, graph, place, scenario } from "../example";
+import { detector, program } from "../signals/program";
 
 /** Everything that a handler has asked of the editor. */
 class Log {
@@ -525,6 +526,28 @@ test("with a tool in the hand, and where segments are pointed at, a drag moves t
   expect(using(placeTool("car"), document).handler.grab(at(0, 0))).toBeNull();
   expect(using(null, document, {}, "region").handler.grab(at(0, 0))).toBeNull();
   expect(using(null, document, {}, "traffic").handler.grab(at(0, 0))).toBeNull();
+});
+
+test("a detector is dragged along its lane, also in the step of the lights", () => {
+  const place: [number, number][] = [
+    [20, 0],
+    [22, 0],
+  ];
+  const lane = {
+    id: "1.0.-1",
+    approach: "r1",
+    line: [[0, 0] as [number, number], [50, 0] as [number, number]],
+  };
+  const more = {
+    light: "10",
+    program: { ...program(), detectors: [detector("J1.D1.0", { place })], lanes: [lane] },
+    detectors: [{ id: "D1", at: "1.0.-1", before: 28, length: 2 }],
+  } as unknown as Partial<Editing>;
+  for (const step of ["lights", "study"] as const) {
+    const { handler } = using(null, scenario([]), more, step);
+    expect(handler.grab(at(22, 0))?.hint).toBe("Moving detector D1 along its lane");
+    expect(handler.grab(at(40, 30))).toBeNull();
+  }
 });
 
 test("the same tool is known again, and only one that makes something new clears the selection", () => {

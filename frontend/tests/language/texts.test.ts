@@ -95,6 +95,7 @@ const REPLACED: readonly [now: RegExp, better: string][] = [
     "unresolved queue, blocked by closure, waited to enter",
   ],
   [/^Can(not| only) be said|does not travel|^Left out, though/, "exported approximately, not supported"],
+  [/^not held: /i, "constraint not enforced"],
   [/^Resume later$/, "Pause and save"],
   [/(blue|yellow|grey) (points?|one)\b/, "lane, sidewalk: points are drawn only when near"],
   [/^time is .* or more, /, "At t = 0 s"],

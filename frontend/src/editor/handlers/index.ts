@@ -14,7 +14,8 @@ const OF_STEP: Partial<Record<Step, (editing: Editing) => Handler>> = {
   region: regionHandler,
   traffic: trafficHandler,
   transit: lookingHandler,
-  lights: lightsHandler,
+  // Their detectors are dragged there, too.
+  lights: (editing) => withDetectors(lightsHandler(editing), editing),
   measures: lookingHandler,
   rules: lookingHandler,
   study: lookingHandler,

@@ -72,7 +72,7 @@ def _read_parameter(report: ImportReport, element: _Element, earlier: frozenset[
     groups = list(report.children(element, "ConstraintGroup"))
     for bound in element.iterfind("ConstraintGroup/ValueConstraint"):
         report.mark(bound, "taken")
-        why = "one of several groups, of which any may hold" if len(groups) > 1 else ""
+        why = "one of several alternatives" if len(groups) > 1 else ""
         if not report.uses.get((bound, "value"), frozenset()) <= earlier:
             why = "it depends on a parameter that is declared later"
         _read_bound(report, bound, found, value=value, why=why)
@@ -90,7 +90,7 @@ def _read_bound(
     elif not why and not holds:
         why = f"the declared value {value:g} does not keep it"
     if why or side is None:
-        report.mark(bound, "approximated", f"not held: {why}")
+        report.mark(bound, "approximated", f"constraint not enforced: {why}")
         return
     found[side] = report.formulas.get((bound, "value"), float(limit))
     if rule in ("greaterThan", "lessThan"):
