@@ -1,7 +1,7 @@
 """An agent learns to switch lights, and is judged beside what lights have today.
 
-Run it with ``python examples/learn_lights.py [WORKSPACE [EPISODES]]``; training takes ten
-minutes of one processor, the comparison two more. docs/behaviour.md says what comes out.
+Run it with ``python examples/learn_lights.py [WORKSPACE [EPISODES]]``; training takes four to ten
+minutes of one processor, the comparison four more. docs/behaviour.md says what comes out.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import odscen
 from odscen import demand, edit, rl
 
 TRIPS = {"signal_crossing": 250, "left_hand_crossing": 200}
-SEEDS = tuple(range(1, 11))
+SEEDS = tuple(range(1, 31))
 
 
 def rush_hour(workspace: odscen.Workspace, name: str) -> odscen.Scenario:
