@@ -42,6 +42,12 @@ def test_the_frechet_distance_of_a_stretch_is_that_of_the_deviations() -> None:
     assert frechet_distance(ROWS, stretched) == pytest.approx(4.0, rel=0.02)
 
 
+def test_one_vehicle_has_no_frechet_distance() -> None:
+    """Draws for the interval of a map with hardly any vehicle have such: they do not count."""
+    assert np.isnan(frechet_distance(ROWS, ROWS[:1]))
+    assert np.isnan(frechet_distance(ROWS, ROWS[:0]))
+
+
 def test_the_discrepancy_is_none_for_the_same_and_grows_with_a_shift() -> None:
     near, far = (mean_discrepancy(ROWS, ROWS + shift) for shift in (0.5, 2.0))
     assert mean_discrepancy(ROWS, ROWS) == pytest.approx(0.0, abs=1e-9)

@@ -251,9 +251,14 @@ def together(rows: Sequence[VehicleRows]) -> VehicleRows:
 
 
 def frechet_distance(reference: FloatArray, other: FloatArray) -> float:
-    """Frechet distance of two sets of rows, standardised by the reference."""
+    """Frechet distance of two sets of rows, standardised by the reference.
+
+    NaN of fewer than two rows, which have no covariance.
+    """
     from scipy.linalg import sqrtm
 
+    if min(len(reference), len(other)) < 2:
+        return float("nan")
     one, two = _standardize_rows(reference, other)
     means = one.mean(axis=0) - two.mean(axis=0)
     first, second = np.cov(one.T), np.cov(two.T)
