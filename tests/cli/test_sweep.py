@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from odscen.base.errors import InputError
+from odscen.cli.sweep_command import search
+from odscen.experiments.searches import SearchSettings
+from odscen.experiments.sweeps import SweepSettings
 from tests.cli.conftest import odscen
 
 SUITES = Path(__file__).parents[2] / "suites" / "scenarios"
@@ -99,3 +103,18 @@ def test_bad_input_is_exit_2_with_words_and_leaves_nothing(
     assert found.code == 2
     assert words in found.err
     assert not (tmp_path / "busy-sweep").exists()
+
+
+def test_a_search_has_a_seed_of_its_proposals_and_another_one_of_its_runs(
+    workspace: Path, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = {}
+
+    def find(*_: object, search_settings: SearchSettings, settings: SweepSettings, **__: object):
+        given.update(proposals=search_settings.seed, runs=settings.seed)
+        raise InputError("enough is known")
+
+    monkeypatch.setattr("odscen.experiments.searches.search", find)
+    with pytest.raises(InputError, match="enough"):
+        search(scenario, search_seed=5, seed=7, out=tmp_path / "found", workspace=workspace)
+    assert given == {"proposals": 5, "runs": 7}
