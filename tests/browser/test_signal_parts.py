@@ -168,6 +168,7 @@ def test_a_program_is_made_part_by_part_with_the_bytes_of_the_file_and_undone(
 
     # A run has both plans in its time bar.
     light.get_by_role("button", name="Close the traffic light").click()
+    user.step("Run").click()
     user.choose_pace("As fast as possible")
     user.run.click()
     expect(user.result).to_contain_text("finished")
