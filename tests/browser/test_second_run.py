@@ -52,6 +52,10 @@ def move(user: OdscenPage, hand: Hand, number: int) -> None:
         if isinstance(hand, Keyboard):
             user.page.keyboard.press(".")
         else:
+            # To choose it in the table moves nothing: from afar a step is less than a drag.
+            user.page.mouse.move(*user.map.at(x, y))
+            for _ in range(8):
+                user.page.mouse.wheel(0, -240)
             user.map.drag((x, y), (x - STEP, y))
     assert user.graph.place(user.document()["actors"][number]["spawn"]) == pytest.approx(
         (x - STEP, y), abs=0.1
