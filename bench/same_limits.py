@@ -2,8 +2,9 @@
 
 Limits of roads, or by their type, are written into the lanes of the map, where netconvert reads
 them. In junctions it takes none: there each lane is held to the limit of the connecting road that
-it runs over. A connection of netconvert's that is one with a stop sign in odscen's network gets it,
-too. Right of way stays netconvert's.
+it runs over, and to the speed at which drivers take the same turn in odscen's network: its own lets
+them corner with 5.5 m/s2. A connection of netconvert's that is one with a stop sign in odscen's
+network gets it, too. Right of way stays netconvert's.
 """
 
 from __future__ import annotations
@@ -82,6 +83,7 @@ def add_signs_and_inner_limits(path: Path, ours: Path, net: Path) -> None:
             peer.link.set("state", "s")
         over = [param.get("value", "").split() for lane in same.lanes for param in lane]
         held = min((limits.get(one, math.inf) for some in over for one in some), default=math.inf)
+        held = min(held, *(float(lane.get("speed", math.inf)) for lane in same.lanes))
         for lane in peer.lanes:
             lane.set("speed", f"{min(float(lane.get('speed', 0)), held):.2f}")
     tree.write(net)
