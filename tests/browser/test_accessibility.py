@@ -174,7 +174,7 @@ def test_the_program_of_a_light_that_can_be_changed(
         "Change the plans of the day",
     ):
         light.get_by_text(summary, exact=True).click()
-    light.get_by_role("button", name="Change K1L").click()
+    light.get_by_role("button", name="Change V1L").click()
     inspector.look("editor-signals-open")
 
 

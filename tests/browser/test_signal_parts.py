@@ -59,8 +59,8 @@ def test_a_program_is_made_part_by_part_with_the_bytes_of_the_file_and_undone(
 
     # A least green that no stage gives is refused at its field; one that fits is taken.
     groups = unfold(light, "Change signal groups and stages")
-    groups.get_by_role("button", name="Change K1L").click()
-    form = groups.get_by_role("region", name="Signal group K1L")
+    groups.get_by_role("button", name="Change V1L").click()
+    form = groups.get_by_role("region", name="Signal group V1L")
     least = form.get_by_label("Least green")
     least.fill("30")
     least.press("Enter")
@@ -71,18 +71,18 @@ def test_a_program_is_made_part_by_part_with_the_bytes_of_the_file_and_undone(
         least.fill("8")
         least.press("Enter")
     # Greens that are never allowed are told without asking.
-    form.get_by_role("radiogroup", name="K1L in stage 4").get_by_text("Green").click()
+    form.get_by_role("radiogroup", name="V1L in stage 4").get_by_text("Green").click()
     expect(form.get_by_role("alert").filter(visible=True)).to_contain_text(
-        "K1L and F1 cross: they can never be green together. F1 is green in stage 4."
+        "V1L and P1 cross: they can never be green together. P1 is green in stage 4."
     )
-    form.get_by_role("radiogroup", name="K1L in stage 1").get_by_text("Green").click()
+    form.get_by_role("radiogroup", name="V1L in stage 1").get_by_text("Green").click()
     expect(form.get_by_role("alert").filter(visible=True)).to_contain_text("has to give way to")
 
     # A new group by keyboard: it takes a turn from another.
     button = groups.get_by_role("button", name="New signal group")
     button.press("Enter")
     new = groups.get_by_role("region", name="New signal group")
-    new.get_by_label("Name").fill("K2L")
+    new.get_by_label("Name").fill("V2L")
     turns = new.get_by_label("Turns and crossings").first
     turns.focus()
     page.keyboard.type("r2 left")
@@ -90,11 +90,11 @@ def test_a_program_is_made_part_by_part_with_the_bytes_of_the_file_and_undone(
     page.keyboard.press("Enter")
     with user.changing():
         new.get_by_role("button", name="Add the group").press("Enter")
-    expect(groups.get_by_role("region", name="Signal group K2L")).to_contain_text("r2 left")
+    expect(groups.get_by_role("region", name="Signal group V2L")).to_contain_text("r2 left")
 
     # An intergreen: shorter than computed is refused at the matrix, longer is kept.
     matrix = unfold(light, "Change intergreens")
-    cell = matrix.get_by_label("Intergreen from K4 to F1, seconds; the paths need 7")
+    cell = matrix.get_by_label("Intergreen from V4 to P1, seconds; the paths need 7")
     cell.fill("6")
     cell.press("Enter")
     expect(matrix.get_by_role("alert").filter(visible=True)).to_contain_text("is too short")
@@ -147,19 +147,19 @@ def test_a_program_is_made_part_by_part_with_the_bytes_of_the_file_and_undone(
         ("B", ["00:00", "09:00"], 0), ("A", ["06:00"], 7),
     ]  # fmt: skip
     wanted = program(
-        intergreens=[["K4", "F1", 11]],
+        intergreens=[["V4", "P1", 11]],
         detectors=[{"id": "D1", "at": moved["at"], "before": moved["before"], "stages": ["1", "2"],
                     "gap": 2.5}],
         plans=[{"id": "B", "times": ["00:00", "09:00"]},
                {"id": "A", "times": ["06:00"], "offset": 7}],
     )  # fmt: skip
-    at = [group["id"] for group in wanted["groups"]].index("K2")
-    others = next(one["movements"] for one in by_page["groups"] if one["id"] == "K2")
+    at = [group["id"] for group in wanted["groups"]].index("V2")
+    others = next(one["movements"] for one in by_page["groups"] if one["id"] == "V2")
     assert sorted(others) == ["r2 right", "r2 straight"]
     wanted["groups"][at]["movements"] = others
-    wanted["groups"].insert(at + 1, {"id": "K2L", "movements": ["r2 left"]})
+    wanted["groups"].insert(at + 1, {"id": "V2L", "movements": ["r2 left"]})
     wanted["groups"][1]["min_green"] = 8
-    wanted["stages"][2]["permissive"] = ["K2", "K4", "K2L"]
+    wanted["stages"][2]["permissive"] = ["V2", "V4", "V2L"]
     by_file = before.model_copy(
         update={"signals": Signals.model_validate({"control": "actuated", "junctions": [wanted]})}
     )

@@ -28,7 +28,7 @@ def test_a_program_is_shown_exported_and_imported_again(tmp_path: Path) -> None:
     file.write_text(dumps(own))
     shown = odscen("signals", "show", file, "--workspace", space, "--json").json
     (light,) = shown["lights"]
-    assert [group["id"] for group in light["groups"]][:2] == ["K1", "K1L"]
+    assert [group["id"] for group in light["groups"]][:2] == ["V1", "V1L"]
     assert light["plans"][0]["offset"] == 12.0
     assert "pedestrian clearance" in odscen("signals", "show", file, "--workspace", space).out
     odscen("signals", "export", file, "-o", signals, "--workspace", space)
@@ -38,7 +38,7 @@ def test_a_program_is_shown_exported_and_imported_again(tmp_path: Path) -> None:
         "signals", "import", file, signals, "-o", back, "--workspace", space, "--json"
     ).json
     assert told == {"scenario": str(back), "notes": []}
-    assert '"id": "K1L"' in back.read_text()
+    assert '"id": "V1L"' in back.read_text()
     wrong = odscen("signals", "import", file, file, "--workspace", space, "--json")
     assert wrong.code != 0
     assert "not well-formed XML" in wrong.json["error"]["message"]

@@ -21,11 +21,11 @@ from odscen.reports.signal_pictures import (
 
 GROUPS = (
     ShownGroup(
-        "K1", (0, 1), ("r1",), walk=False, lanes=(("a", ":a"), ("a", ":a1")),
+        "V1", (0, 1), ("r1",), walk=False, lanes=(("a", ":a"), ("a", ":a1")),
         paths=(((0.0, 0.0), (10.0, 0.0)), ((0.0, 0.0), (5.0, 5.0))),
     ),
-    ShownGroup("K2", (2,), ("r2 <left>",), walk=False, paths=(((5.0, -5.0), (5.0, 5.0)),)),
-    ShownGroup("F1", (3,), ("walk r1",), walk=True, paths=(((9.0, -2.0), (9.0, 2.0)),)),
+    ShownGroup("V2", (2,), ("r2 <left>",), walk=False, paths=(((5.0, -5.0), (5.0, 5.0)),)),
+    ShownGroup("P1", (3,), ("walk r1",), walk=True, paths=(((9.0, -2.0), (9.0, 2.0)),)),
 )  # fmt: skip
 PHASES = (
     ProgramPhase(20.0, "Ggrr", "stage 1", "1"),
@@ -60,9 +60,9 @@ def test_bars_are_green_permissive_and_yellow_at_their_seconds() -> None:
 def test_each_stage_has_a_picture_with_its_seconds_and_groups() -> None:
     stages = JunctionPictures(LIGHT).stages(PLAN)
     assert [(stage.words, stage.detail) for stage in stages] == [
-        ("stage 1: 20 s", "K1"),
-        ("stage 2: 10 to 15 s", "K2"),
-        ("stage 3: 7 s", "F1 on call"),
+        ("stage 1: 20 s", "V1"),
+        ("stage 2: 10 to 15 s", "V2"),
+        ("stage 3: 7 s", "P1 on call"),
     ]
     first = etree.fromstring(str(stages[0].picture))
     kinds = [path.get("class") for path in first.iter("path")]
@@ -83,7 +83,7 @@ def test_the_section_has_cards_bars_and_a_row_for_each_group() -> None:
         LightsOfRun((LIGHT,), states(), table), {"cycle_failures": 0.25, "unused_green": 0.1}
     )
     text = str(render_block("run_report.html.j2", "signals", signals=values))
-    assert "<figcaption><b>stage 2: 10 to 15 s</b><span>K2</span></figcaption>" in text
+    assert "<figcaption><b>stage 2: 10 to 15 s</b><span>V2</span></figcaption>" in text
     assert "Junction 1, actuated, program of the scenario" in text
     assert "25" in text
     assert "r2 &lt;left&gt;" in text

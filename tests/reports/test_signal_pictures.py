@@ -58,8 +58,8 @@ def test_stages_have_the_seconds_groups_and_splits_of_the_program() -> None:
     assert sum(one.split for one in stage_spans(day)) == day.cycle == 84.0
     assert [one.seconds for one in stage_spans(evening)] == [14.0, 6.0, 10.0, 7.0]
     first, second, _, call = stage_spans(day)
-    assert first.groups(light()) == ("K1", "K1L", "K3", "K3L", "F2", "F4")
-    assert first.groups(light(), "g") == ("K1", "K1L", "K3", "K3L")
+    assert first.groups(light()) == ("V1", "V1L", "V3", "V3L", "P2", "P4")
+    assert first.groups(light(), "g") == ("V1", "V1L", "V3", "V3L")
     assert second.groups(light(), "g") == ()
     assert call.on_call
 
@@ -75,9 +75,9 @@ def test_the_pictures_of_the_stages_show_who_has_green_and_who_gives_way() -> No
     assert (movements(two.picture, "green"), movements(two.picture, "permissive")) == (2, 0)
     assert movements(four.picture, "green walk") == 1
     assert movements(four.picture, "red") == 20
-    assert (two.words, three.detail, four.detail) == ("stage 2: 6 s", "K2 K4 F3", "F1 on call")
+    assert (two.words, three.detail, four.detail) == ("stage 2: 6 s", "V2 V4 P3", "P1 on call")
     title = etree.fromstring(str(one.picture)).findtext("title")
-    assert title == "stage 1: 20 s; green: K1 K1L K3 K3L F2 F4; gives way: K1 K1L K3 K3L"
+    assert title == "stage 1: 20 s; green: V1 V1L V3 V3L P2 P4; gives way: V1 V1L V3 V3L"
 
 
 def test_detectors_lie_where_the_scenario_puts_them() -> None:
@@ -89,7 +89,7 @@ def test_detectors_lie_where_the_scenario_puts_them() -> None:
         (x0, y0), (x1, y1) = one.place
         assert (x0 - x1, abs(y0 - y1)) == pytest.approx((2.0, 0.0), abs=0.1)
     assert len({one.place[0][1] for one in loops}) == 3
-    crossing_ends = next(group.paths[0] for group in light().groups if group.id == "F1")
+    crossing_ends = next(group.paths[0] for group in light().groups if group.id == "P1")
     assert {one.place[0] for one in waiting} == {crossing_ends[0], crossing_ends[-1]}
     assert detector_rows(light()) == [
         ("D1", "3", "30", "3", "prolongs stage 1"),
@@ -143,7 +143,7 @@ def test_stages_and_what_lies_between_them_make_the_cycle() -> None:
     ]
     assert all(a.end == b.begin for a, b in itertools.pairwise(spans))
     assert spans[-1] == (72.0, 84.0, "all-red", "")
-    assert split_rows(light(), light().plans[0])[3] == ("4 (on call)", "7", "19", "23", "F1")
+    assert split_rows(light(), light().plans[0])[3] == ("4 (on call)", "7", "19", "23", "P1")
 
 
 def test_a_time_bar_of_any_width_says_where_its_seconds_begin_and_end() -> None:

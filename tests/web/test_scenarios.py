@@ -41,12 +41,12 @@ RULE = {
     "then": [{"brake": {"by": 4, "hold": 2}}],
 }
 GROUPS = [
-    *({"id": f"K{n}", "movements": [f"r{n}"]} for n in range(1, 5)),
-    *({"id": f"F{n}", "movements": [f"walk r{n}"]} for n in range(1, 5)),
+    *({"id": f"V{n}", "movements": [f"r{n}"]} for n in range(1, 5)),
+    *({"id": f"P{n}", "movements": [f"walk r{n}"]} for n in range(1, 5)),
 ]
 STAGES = [
-    {"id": "1", "protected": ["F2", "F4"], "permissive": ["K1", "K3"], "green": 20},
-    {"id": "2", "protected": ["F1", "F3"], "permissive": ["K2", "K4"], "green": 15},
+    {"id": "1", "protected": ["P2", "P4"], "permissive": ["V1", "V3"], "green": 20},
+    {"id": "2", "protected": ["P1", "P3"], "permissive": ["V2", "V4"], "green": 15},
 ]
 ALL = (
     ("grow_roi", {"segment": "j10001"}),
@@ -75,11 +75,11 @@ ALL = (
     ("set_timing", {"junction": "10001", "groups": GROUPS, "stages": STAGES}),
     ("set_stage", {"junction": "10001", "stage": "2", "on_call": True}),
     ("set_turn", {"junction": "10001", "approach": "r1", "treatment": "both"}),
-    ("set_group", {"junction": "10001", "group": "K2L", "movements": ["r2 left"], "min_green": 9}),
-    ("remove_group", {"junction": "10001", "group": "K2L", "into": "K2"}),
-    ("add_stage", {"junction": "10001", "stage": "5", "protected": ["F1"], "green": 8}),
+    ("set_group", {"junction": "10001", "group": "V2L", "movements": ["r2 left"], "min_green": 9}),
+    ("remove_group", {"junction": "10001", "group": "V2L", "into": "V2"}),
+    ("add_stage", {"junction": "10001", "stage": "5", "protected": ["P1"], "green": 8}),
     ("remove_stage", {"junction": "10001", "stage": "5"}),
-    ("set_intergreen", {"junction": "10001", "ending": "K2", "beginning": "K1", "seconds": 12}),
+    ("set_intergreen", {"junction": "10001", "ending": "V2", "beginning": "V1", "seconds": 12}),
     ("set_detector", {"junction": "10001", "detector": "D1", "at": "r1", "stages": ["1"]}),
     ("remove_detector", {"junction": "10001", "detector": "D1"}),
     ("set_plan", {"junction": "10001", "plan": "A", "times": ["06:00"]}),

@@ -108,7 +108,7 @@ def test_a_program_of_a_scenario_comes_with_plans_pictures_and_whose_it_is(
     ]  # fmt: skip
     stage = light.plans[0].stages[0]
     assert (stage.words, stage.split, stage.permissive) == (
-        "stage 1: 20 s", 32.0, ["K1", "K1L", "K3", "K3L"],
+        "stage 1: 20 s", 32.0, ["V1", "V1L", "V3", "V3L"],
     )  # fmt: skip
     assert 'href="#signal-ground"' in stage.picture
     assert 'id="signal-ground"' in light.ground
@@ -138,11 +138,11 @@ def test_an_unknown_light_and_a_program_that_is_refused_are_told(
     assert JUNCTION in wrong.json()["error"]["message"]
     file = workspace.scenarios / f"{own}{SUFFIX}"
     document = json.loads(file.read_text())
-    document["signals"]["junctions"][0]["intergreens"] = [["K2", "F1", 1]]
+    document["signals"]["junctions"][0]["intergreens"] = [["V2", "P1", 1]]
     file.write_text(json.dumps(document))
     refused = client.get(f"/api/scenarios/{own}/signals/{JUNCTION}")
     assert refused.status_code == 422
-    assert "K2" in refused.text
+    assert "V2" in refused.text
 
 
 @pytest.mark.slow

@@ -110,8 +110,8 @@ def signal_parts(studio: Studio) -> None:
     with studio.visit(height=TALL) as camera:
         light = _program(camera)
         groups = _unfolded(light, "Change signal groups and stages")
-        groups.get_by_role("button", name="Change K1L").click()
-        group = groups.get_by_role("region", name="Signal group K1L")
+        groups.get_by_role("button", name="Change V1L").click()
+        group = groups.get_by_role("region", name="Signal group V1L")
         group.evaluate(TO_TOP)
         camera.take("signal-group", group)
         _folded(groups)

@@ -152,7 +152,7 @@ class _ProgramTaker:
         for key, links in columns.items():
             walk = bool(key[0])
             numbers[walk] += 1
-            found[f"{'F' if walk else 'K'}{numbers[walk]}"] = tuple(links)
+            found[f"{'P' if walk else 'V'}{numbers[walk]}"] = tuple(links)
         return found
 
     def _named_groups(self) -> dict[str, tuple[int, ...]]:

@@ -47,14 +47,14 @@ def greens(folder: Path, group: str, one: Scenario) -> list[tuple[float, float]]
 @pytest.mark.slow
 def test_an_intergreen_that_is_set_is_shown_in_a_run_to_the_second(tmp_path: Path) -> None:
     one = scenario(one_plan(**BARE), walkers=0.0, until=300.0)
-    longer = edits.set_intergreen(one, LIGHTS, JUNCTION, ending="K1", beginning="K3L", seconds=9)
+    longer = edits.set_intergreen(one, LIGHTS, JUNCTION, ending="V1", beginning="V3L", seconds=9)
     longer = edits.set_intergreen(
-        longer, LIGHTS, JUNCTION, ending="K3L", beginning="K2", seconds=11
+        longer, LIGHTS, JUNCTION, ending="V3L", beginning="V2", seconds=11
     )
     for made, pause in ((one, 6.0), (longer, 11.0)):
         folder = carried_out(made, tmp_path / f"{pause:g}").folder
-        ends = [end for _, end in greens(folder, "K3L", made)]
-        begins = [begin for begin, _ in greens(folder, "K2", made) if begin > ends[0]]
+        ends = [end for _, end in greens(folder, "V3L", made)]
+        begins = [begin for begin, _ in greens(folder, "V2", made) if begin > ends[0]]
         assert len(begins) >= 2
         gaps = [begin - end for end, begin in zip(ends, begins, strict=False)]
         assert gaps == pytest.approx([pause] * len(gaps))
@@ -62,11 +62,11 @@ def test_an_intergreen_that_is_set_is_shown_in_a_run_to_the_second(tmp_path: Pat
 
 def test_a_group_of_its_own_has_green_in_the_stages_that_were_chosen(tmp_path: Path) -> None:
     one = scenario(one_plan(**BARE), walkers=0.0, until=300.0)
-    new = edits.set_group(one, LIGHTS, JUNCTION, "K2L", movements=["r2 left"])
-    new = edits.add_stage(new, LIGHTS, JUNCTION, "5", protected=["K2L"], green=9, after="2")
-    new = edits.set_group(new, LIGHTS, JUNCTION, "K2L", protected=["5"], permissive=[])
+    new = edits.set_group(one, LIGHTS, JUNCTION, "V2L", movements=["r2 left"])
+    new = edits.add_stage(new, LIGHTS, JUNCTION, "5", protected=["V2L"], green=9, after="2")
+    new = edits.set_group(new, LIGHTS, JUNCTION, "V2L", protected=["5"], permissive=[])
     folder = carried_out(new, tmp_path).folder
-    own, others = greens(folder, "K2L", new), greens(folder, "K2", new)
+    own, others = greens(folder, "V2L", new), greens(folder, "V2", new)
     assert [end - begin for begin, end in own] == pytest.approx([9.0] * len(own))
     assert len(own) >= 3
     assert not any(a < end and begin < b for a, b in own for begin, end in others)
@@ -86,7 +86,7 @@ def test_a_detector_prolongs_the_green_of_its_stage_as_long_as_its_gap_says(
         calls = read_calls(run.folder)
         assert calls is not None
         assert any(".D1." in name for name in calls["detector"].unique())
-        lengths[gap] = [end - begin for begin, end in greens(run.folder, "K3", made)]
+        lengths[gap] = [end - begin for begin, end in greens(run.folder, "V3", made)]
     # Stage 1 lasts between its green of 20 s and its max_green of 35 s.
     assert sum(lengths[5.0]) / len(lengths[5.0]) > sum(lengths[1.0]) / len(lengths[1.0]) + 3.0
     assert all(20.0 <= s <= 36.0 + 6.0 for some in lengths.values() for s in some)
@@ -105,10 +105,10 @@ def test_plans_of_the_day_switch_at_their_times_with_their_own_greens(tmp_path: 
     (_, (switch, _)) = plans
     assert 150.0 <= switch < 150.0 + 100.0
     per_plan = {
-        plan: {round(e - b, 1) for b, e in greens(folder, "K1", one) if plan == at_time(plans, b)}
+        plan: {round(e - b, 1) for b, e in greens(folder, "V1", one) if plan == at_time(plans, b)}
         for plan in ("A", "B")
     }
-    # K1 ends as late as it may, some seconds after the 32 and the 20 s of its stage.
+    # V1 ends as late as it may, some seconds after the 32 and the 20 s of its stage.
     assert min(per_plan["A"]) - min(per_plan["B"]) == pytest.approx(12.0)
 
 

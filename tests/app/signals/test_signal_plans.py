@@ -408,12 +408,12 @@ def test_conflicting_greens_are_refused_on_a_network_by_netconvert_with_both_mov
     by_netconvert: Workspace, tmp_path: Path
 ) -> None:
     first, *others = program()["stages"]
-    first = {**first, "permissive": [*first["permissive"], "K2"]}
+    first = {**first, "permissive": [*first["permissive"], "V2"]}
     design = one_plan(stages=[first, *others])
     with pytest.raises(ScenarioError) as raised:
         run(by_netconvert, placed(by_netconvert, scenario(design)), out=tmp_path)
     message = str(raised.value)
-    assert "r1>r3 (group 'K1') and r2>r" in message or "r2>r4 (group 'K2') and r1>r" in message
+    assert "r1>r3 (group 'V1') and r2>r" in message or "r2>r4 (group 'V2') and r1>r" in message
     assert "which meet; they cannot have green together" in message
 
 

@@ -158,9 +158,9 @@ def test_saturation_flow_is_measured_from_the_fifth_vehicle_of_each_queue_on() -
 LIGHT = LightProgram(
     "J1", ("j1",), "fixed-time", own=False, plans=(),
     groups=(
-        ShownGroup("K1", (0,), (LEFT,), walk=False, lanes=(("l", ":l"),)),
-        ShownGroup("K2", (1,), (THROUGH,), walk=False, lanes=(("t", ":t"),)),
-        ShownGroup("K3", (2,), ("r2>j1>r1",), walk=False, lanes=(("o", ":o"),)),
+        ShownGroup("V1", (0,), (LEFT,), walk=False, lanes=(("l", ":l"),)),
+        ShownGroup("V2", (1,), (THROUGH,), walk=False, lanes=(("t", ":t"),)),
+        ShownGroup("V3", (2,), ("r2>j1>r1",), walk=False, lanes=(("o", ":o"),)),
     ),
 )  # fmt: skip
 STATES = pl.DataFrame(

@@ -11,9 +11,9 @@ from odscen.figures.measures.signal_use import signal_use
 from odscen.records.light_programs import LightProgram, ShownGroup
 
 GROUPS = (
-    ShownGroup("K1", (0,), ("r1",), walk=False, lanes=(("a", ":a", ":a2"),)),
-    ShownGroup("K2", (1,), ("r2",), walk=False, lanes=(("b", ":b"),)),
-    ShownGroup("F1", (2,), ("walk r1",), walk=True),
+    ShownGroup("V1", (0,), ("r1",), walk=False, lanes=(("a", ":a", ":a2"),)),
+    ShownGroup("V2", (1,), ("r2",), walk=False, lanes=(("b", ":b"),)),
+    ShownGroup("P1", (2,), ("walk r1",), walk=True),
 )
 LIGHT = LightProgram("J1", ("1",), "fixed", own=True, groups=GROUPS, plans=())
 STATES = [
@@ -62,19 +62,19 @@ def test_greens_served_are_those_that_were_shown() -> None:
 def test_green_is_unused_from_three_seconds_after_a_vehicle_until_the_next() -> None:
     table = used(("c", 4.0, ":a", 8.0), ("c", 4.5, ":a2", 8.0), ("d", 12.0, ":a", 8.0))
     # 0 to 4: 1 s; 4 to 12: 5 s; 12 to 20: 5 s; the second green of 20 s: 17 s.
-    assert table["K1"]["vehicles"] == 2
-    assert table["K1"]["unused_green"] == pytest.approx(28.0)
-    assert table["K2"]["unused_green"] == pytest.approx(7.0 + 2.0)
-    assert table["F1"]["unused_green"] is None
+    assert table["V1"]["vehicles"] == 2
+    assert table["V1"]["unused_green"] == pytest.approx(28.0)
+    assert table["V2"]["unused_green"] == pytest.approx(7.0 + 2.0)
+    assert table["P1"]["unused_green"] is None
 
 
 def test_a_green_fails_if_one_that_stood_before_it_began_has_not_passed_at_its_end() -> None:
     elsewhere = [("c", 2.0, "far away", 0.0), ("c", 67.0, ":b", 5.0)]
-    assert used(*elsewhere)["K2"]["cycle_failures"] == 0
+    assert used(*elsewhere)["V2"]["cycle_failures"] == 0
     waiting = [("c", 2.0, "b", 0.0), ("c", 66.0, ":b", 5.0)]
-    assert used(*waiting)["K2"]["cycle_failures"] == 1
+    assert used(*waiting)["V2"]["cycle_failures"] == 1
     served = [("c", 26.0, "b", 0.0), ("c", 66.0, ":b", 5.0)]
-    assert used(*served)["K2"]["cycle_failures"] == 0  # it came when the green had begun
+    assert used(*served)["V2"]["cycle_failures"] == 0  # it came when the green had begun
 
 
 def test_the_figures_of_the_run_are_shares_over_all_groups_for_vehicles() -> None:

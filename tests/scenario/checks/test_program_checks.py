@@ -35,46 +35,46 @@ def test_the_program_of_the_guide_has_no_problem() -> None:
 
 
 def test_conflicting_greens_are_refused_with_both_movements_named() -> None:
-    wrong = stages(s2={"protected": ["K1L", "K2"]})
+    wrong = stages(s2={"protected": ["V1L", "V2"]})
     found = [p for p in problems(one_plan(stages=wrong)) if p.code == "conflicting_greens"]
     problem = only(found)
     assert problem.where == "signals.junctions[0].stages[1]"
-    assert "r1>r4 (group 'K1L')" in problem.message
-    assert "(group 'K2')" in problem.message
+    assert "r1>r4 (group 'V1L')" in problem.message
+    assert "(group 'V2')" in problem.message
     assert "they cannot have green together" in problem.message
 
 
 def test_a_turn_across_has_to_be_called_permissive() -> None:
-    wrong = stages(s1={"protected": ["F2", "F4", "K1L"], "permissive": ["K1", "K3", "K3L"]})
+    wrong = stages(s1={"protected": ["P2", "P4", "V1L"], "permissive": ["V1", "V3", "V3L"]})
     found = [p for p in problems(one_plan(stages=wrong)) if p.code == "conflicting_greens"]
     assert {p.where for p in found} == {"signals.junctions[0].stages[0]"}
-    assert all("make group 'K1L', which gives way, permissive" in p.message for p in found)
+    assert all("make group 'V1L', which gives way, permissive" in p.message for p in found)
 
 
 def test_an_intergreen_that_is_too_short_is_refused_with_both_times() -> None:
-    problem = only(problems(one_plan(intergreens=[["K2", "F1", 5]])))
+    problem = only(problems(one_plan(intergreens=[["V2", "P1", 5]])))
     assert problem.code == "intergreen_too_short"
     assert problem.where == "signals.junctions[0].intergreens[0]"
-    assert "5 s between group 'K2' and group 'F1'" in problem.message
+    assert "5 s between group 'V2' and group 'P1'" in problem.message
     assert "needs 8 s to clear the path of walk r1" in problem.message
 
 
 def test_all_red_that_is_too_short_names_the_group() -> None:
-    groups = [{**g, "all_red": 1} if g["id"] == "K4" else g for g in program()["groups"]]
+    groups = [{**g, "all_red": 1} if g["id"] == "V4" else g for g in program()["groups"]]
     found = problems(one_plan(groups=groups))
     assert {p.code for p in found} == {"intergreen_too_short"}
     assert {p.where for p in found} == {"signals.junctions[0].groups[5]"}
-    assert any("4 s between group 'K4' and group 'F1' is too short" in p.message for p in found)
+    assert any("4 s between group 'V4' and group 'P1' is too short" in p.message for p in found)
 
 
 def test_names_that_are_not_there_are_answered_with_those_that_are() -> None:
-    groups = [{"id": "K1", "movements": ["r1>r9"]}, *program()["groups"][1:]]
+    groups = [{"id": "V1", "movements": ["r1>r9"]}, *program()["groups"][1:]]
     found = problems(one_plan(groups=groups))
     assert found[0].code == "unknown_movement"
     assert found[0].where == "signals.junctions[0].groups[0].movements[0]"
     assert "there are r1>r2, r1>r3, r1>r4" in found[0].message
     assert found[1].code == "movement_without_green"
-    wrong = stages(s4={"protected": ["F9"]})
+    wrong = stages(s4={"protected": ["P9"]})
     found = problems(one_plan(stages=wrong))
     assert [p.code for p in found] == ["unknown_group", "movement_without_green"]
     found = problems(program(plans=[{"id": "day", "times": ["06:00"], "green": {"7": 5}}]))
@@ -82,10 +82,10 @@ def test_names_that_are_not_there_are_answered_with_those_that_are() -> None:
 
 
 def test_a_movement_has_one_group_and_every_movement_has_one() -> None:
-    groups = [*program()["groups"], {"id": "K9", "movements": ["r4 left"]}]
+    groups = [*program()["groups"], {"id": "V9", "movements": ["r4 left"]}]
     found = problems(one_plan(groups=groups))
     assert [p.code for p in found] == ["movement_twice", "movement_without_green"]
-    missing = [group for group in program()["groups"] if group["id"] != "F3"]
+    missing = [group for group in program()["groups"] if group["id"] != "P3"]
     codes = {p.code for p in problems(one_plan(groups=missing))}
     assert {"movement_without_green", "unknown_group"} <= codes
 
@@ -134,7 +134,7 @@ def test_lights_of_one_coordination_have_one_cycle() -> None:
 
 
 def test_a_program_with_errors_is_refused_before_anything_is_written() -> None:
-    wrong = scenario(one_plan(intergreens=[["K2", "F1", 5]]))
+    wrong = scenario(one_plan(intergreens=[["V2", "P1", 5]]))
     with pytest.raises(ScenarioError, match="is too short"):
         realize(wrong, crossing().sumo)
 

@@ -104,13 +104,13 @@ def test_a_signal_program_has_a_line_for_each_group_and_stage() -> None:
     timing = JunctionTiming.model_validate(
         {
             "junction": "54",
-            "groups": [{"id": "K1", "movements": ["r1"]}, {"id": "K2", "movements": ["r2"]}],
-            "stages": [{"id": "1", "protected": ["K1"], "green": 20}],
+            "groups": [{"id": "V1", "movements": ["r1"]}, {"id": "V2", "movements": ["r2"]}],
+            "stages": [{"id": "1", "protected": ["V1"], "green": 20}],
         }
     )
     scenario = plain.model_copy(update={"signals": Signals(junctions=(timing,))})
     text = dumps(scenario)
-    assert '        {"id": "K2", "movements": ["r2"]}' in text.splitlines()
+    assert '        {"id": "V2", "movements": ["r2"]}' in text.splitlines()
     assert loads(text) == scenario
 
 

@@ -37,21 +37,21 @@ def cycles(one: Scenario) -> list[float]:
 
 
 def test_a_turn_moves_into_a_new_group_which_shows_what_it_showed_before() -> None:
-    one = edits.set_group(empty(TWO), LIGHTS, JUNCTION, "K1L", movements=["r1 left"])
-    assert members(one)["K1L"] == ("r1 left",)
-    assert set(members(one)["K1"]) == {"r1 straight", "r1 right"}
-    assert stages(one)["1"] == (("F2", "F4"), ("K1", "K3", "K1L"))
+    one = edits.set_group(empty(TWO), LIGHTS, JUNCTION, "V1L", movements=["r1 left"])
+    assert members(one)["V1L"] == ("r1 left",)
+    assert set(members(one)["V1"]) == {"r1 straight", "r1 right"}
+    assert stages(one)["1"] == (("P2", "P4"), ("V1", "V3", "V1L"))
     assert cycles(one) == cycles(empty(TWO))
-    back = edits.remove_group(one, LIGHTS, JUNCTION, group="K1L", into="K1")
+    back = edits.remove_group(one, LIGHTS, JUNCTION, group="V1L", into="V1")
     assert timing(back) == timing(empty(TWO))
 
 
 def test_the_guides_program_is_made_by_edits_alone_with_the_same_bytes() -> None:
     guide = empty(program())
     groups = {group["id"]: group for group in TWO["groups"]}
-    order = ("K1", "K2", "K3", "K4", "F1", "F2", "F3", "F4")
+    order = ("V1", "V2", "V3", "V4", "P1", "P2", "P3", "P4")
     one = empty({**TWO, "groups": [groups[name] for name in order]})
-    for name in ("K1", "K3"):
+    for name in ("V1", "V3"):
         leg = f"r{name[1]}"
         one = edits.set_group(one, LIGHTS, JUNCTION, f"{name}L", movements=[f"{leg} left"])
         one = edits.set_group(
@@ -59,22 +59,22 @@ def test_the_guides_program_is_made_by_edits_alone_with_the_same_bytes() -> None
         )
     # The pedestrian stage on call takes its crossing out of stage 2.
     one = edits.add_stage(
-        one, LIGHTS, JUNCTION, "4", protected=["F1"], green=7, on_call=True, after="2"
+        one, LIGHTS, JUNCTION, "4", protected=["P1"], green=7, on_call=True, after="2"
     )
     one = edits.add_stage(
-        one, LIGHTS, JUNCTION, "3", protected=["F3"], permissive=["K2", "K4"], green=12, after="2"
+        one, LIGHTS, JUNCTION, "3", protected=["P3"], permissive=["V2", "V4"], green=12, after="2"
     )
     one = edits.add_stage(
-        one, LIGHTS, JUNCTION, "new", protected=["K1L", "K3L"], green=6, after="1"
+        one, LIGHTS, JUNCTION, "new", protected=["V1L", "V3L"], green=6, after="1"
     )
     one = edits.remove_stage(one, LIGHTS, JUNCTION, stage="2")
-    one = edits.add_stage(one, LIGHTS, JUNCTION, "2", protected=["K1L", "K3L"], green=6, after="1")
+    one = edits.add_stage(one, LIGHTS, JUNCTION, "2", protected=["V1L", "V3L"], green=6, after="1")
     one = edits.remove_stage(one, LIGHTS, JUNCTION, stage="new")
     one = edits.set_stage(
         one, LIGHTS, JUNCTION, "1", max_green=35,
-        permissive=["K1", "K1L", "K3", "K3L"],
+        permissive=["V1", "V1L", "V3", "V3L"],
     )  # fmt: skip
-    one = edits.set_intergreen(one, LIGHTS, JUNCTION, ending="K2", beginning="F1", seconds=9)
+    one = edits.set_intergreen(one, LIGHTS, JUNCTION, ending="V2", beginning="P1", seconds=9)
     one = edits.set_detector(one, LIGHTS, JUNCTION, "D1", at="r1", before=30, stages=["1"])
     one = edits.set_plan(one, LIGHTS, JUNCTION, "day", times=["06:00"], cycle=84, offset=12)
     one = edits.set_plan(
@@ -85,81 +85,81 @@ def test_the_guides_program_is_made_by_edits_alone_with_the_same_bytes() -> None
 
 def test_a_group_of_a_file_and_of_a_message_are_the_same_edit() -> None:
     data = {
-        "kind": "set_group", "junction": JUNCTION, "group": "K1L", "movements": ["r1 left"],
+        "kind": "set_group", "junction": JUNCTION, "group": "V1L", "movements": ["r1 left"],
         "permissive": ["1"], "min_green": 8,
     }  # fmt: skip
     message = read_edit(json.loads(json.dumps(data)))
     by_message = EDIT_ENTRIES[message.kind].function(empty(TWO), lights=LIGHTS, **message.arguments)
     by_hand = edits.set_group(
-        empty(TWO), LIGHTS, JUNCTION, "K1L", movements=["r1 left"], permissive=["1"], min_green=8
+        empty(TWO), LIGHTS, JUNCTION, "V1L", movements=["r1 left"], permissive=["1"], min_green=8
     )
     assert dumps(by_message) == dumps(by_hand)
-    assert message.label == f"Signal group K1L in junction {JUNCTION}"
+    assert message.label == f"Signal group V1L in junction {JUNCTION}"
 
 
 def test_greens_that_are_never_allowed_together_are_refused_with_both_movements() -> None:
     one = empty(one_plan())
     with pytest.raises(ScenarioError, match=r"stage '1' gives green to .*; they cannot have"):
-        edits.set_group(one, LIGHTS, JUNCTION, "K2", permissive=["1", "3"])
-    with pytest.raises(ScenarioError, match=r"make group 'K1L', which gives way, permissive"):
-        edits.set_group(one, LIGHTS, JUNCTION, "K1L", protected=["1", "2"], permissive=[])
+        edits.set_group(one, LIGHTS, JUNCTION, "V2", permissive=["1", "3"])
+    with pytest.raises(ScenarioError, match=r"make group 'V1L', which gives way, permissive"):
+        edits.set_group(one, LIGHTS, JUNCTION, "V1L", protected=["1", "2"], permissive=[])
     with pytest.raises(NotFoundError, match="stage"):
-        edits.set_group(one, LIGHTS, JUNCTION, "K1L", protected=["9"])
+        edits.set_group(one, LIGHTS, JUNCTION, "V1L", protected=["9"])
 
 
 def test_a_movement_must_have_a_group_and_a_group_a_green() -> None:
     one = empty(one_plan())
     with pytest.raises(ScenarioError, match="they would never have green"):
-        edits.set_group(one, LIGHTS, JUNCTION, "K1", movements=["r1 straight"])
-    with pytest.raises(ScenarioError, match="'K2' has green in no stage"):
-        edits.set_group(one, LIGHTS, JUNCTION, "K2", permissive=[])
-    with pytest.raises(InputError, match="no group 'K9'; a new one needs movements"):
-        edits.set_group(one, LIGHTS, JUNCTION, "K9", yellow=4)
+        edits.set_group(one, LIGHTS, JUNCTION, "V1", movements=["r1 straight"])
+    with pytest.raises(ScenarioError, match="'V2' has green in no stage"):
+        edits.set_group(one, LIGHTS, JUNCTION, "V2", permissive=[])
+    with pytest.raises(InputError, match="no group 'V9'; a new one needs movements"):
+        edits.set_group(one, LIGHTS, JUNCTION, "V9", yellow=4)
     with pytest.raises(InputError, match="has no program of this scenario"):
-        edits.set_group(empty(), LIGHTS, JUNCTION, "K9", movements=["r1"])
+        edits.set_group(empty(), LIGHTS, JUNCTION, "V9", movements=["r1"])
     with pytest.raises(InputError, match="join another group"):
-        edits.remove_group(one, LIGHTS, JUNCTION, group="K1", into="K1")
+        edits.remove_group(one, LIGHTS, JUNCTION, group="V1", into="V1")
 
 
 def test_a_renamed_group_keeps_its_stages_and_intergreens() -> None:
-    one = edits.set_group(empty(one_plan()), LIGHTS, JUNCTION, "K2", id="KX")
-    assert stages(one)["3"] == (("F3",), ("KX", "K4"))
-    assert timing(one).intergreens == (("KX", "F1", 9.0),)
+    one = edits.set_group(empty(one_plan()), LIGHTS, JUNCTION, "V2", id="KX")
+    assert stages(one)["3"] == (("P3",), ("KX", "V4"))
+    assert timing(one).intergreens == (("KX", "P1", 9.0),)
     assert cycles(one) == cycles(empty(one_plan()))
 
 
 def test_a_least_green_of_a_group_counts_over_its_stages_and_is_asked_for_in_seconds() -> None:
     one = empty(one_plan())
-    # K1L has green in stages 1 (20 s) and 2 (6 s), which follow each other.
-    fits = edits.set_group(one, LIGHTS, JUNCTION, "K1L", min_green=26)
+    # V1L has green in stages 1 (20 s) and 2 (6 s), which follow each other.
+    fits = edits.set_group(one, LIGHTS, JUNCTION, "V1L", min_green=26)
     assert timing(fits).groups[1].min_green == 26.0
-    with pytest.raises(ScenarioError, match=r"K1L' may have only 26 s .* stage '1', '2'"):
-        edits.set_group(one, LIGHTS, JUNCTION, "K1L", min_green=27)
-    with pytest.raises(ScenarioError, match=r"'F1' may have only 7 s of green in stage '4'"):
-        edits.set_group(one, LIGHTS, JUNCTION, "F1", min_green=8)
+    with pytest.raises(ScenarioError, match=r"V1L' may have only 26 s .* stage '1', '2'"):
+        edits.set_group(one, LIGHTS, JUNCTION, "V1L", min_green=27)
+    with pytest.raises(ScenarioError, match=r"'P1' may have only 7 s of green in stage '4'"):
+        edits.set_group(one, LIGHTS, JUNCTION, "P1", min_green=8)
     actuated = empty(one_plan(control="actuated"))
     short = edits.set_stage(actuated, LIGHTS, JUNCTION, "3", min_green=6)
-    with pytest.raises(ScenarioError, match=r"'K2' may have only 6 s of green in stage '3'"):
-        edits.set_group(short, LIGHTS, JUNCTION, "K2", min_green=10)
+    with pytest.raises(ScenarioError, match=r"'V2' may have only 6 s of green in stage '3'"):
+        edits.set_group(short, LIGHTS, JUNCTION, "V2", min_green=10)
 
 
 def test_an_intergreen_lengthens_the_cycle_and_goes_back_to_what_the_paths_need() -> None:
     one = empty(one_plan(intergreens=None))
     before = cycles(one)
-    longer = edits.set_intergreen(one, LIGHTS, JUNCTION, ending="K2", beginning="F1", seconds=11)
-    assert timing(longer).intergreens == (("K2", "F1", 11.0),)
+    longer = edits.set_intergreen(one, LIGHTS, JUNCTION, ending="V2", beginning="P1", seconds=11)
+    assert timing(longer).intergreens == (("V2", "P1", 11.0),)
     assert cycles(longer)[0] - before[0] == 3.0  # the paths need 8 s
-    back = edits.set_intergreen(longer, LIGHTS, JUNCTION, ending="K2", beginning="F1", seconds=None)
+    back = edits.set_intergreen(longer, LIGHTS, JUNCTION, ending="V2", beginning="P1", seconds=None)
     assert (timing(back).intergreens, cycles(back)) == ((), before)
-    with pytest.raises(ScenarioError, match=r"7 s between group 'K2' and group 'F1' is too short"):
-        edits.set_intergreen(one, LIGHTS, JUNCTION, ending="K2", beginning="F1", seconds=7)
+    with pytest.raises(ScenarioError, match=r"7 s between group 'V2' and group 'P1' is too short"):
+        edits.set_intergreen(one, LIGHTS, JUNCTION, ending="V2", beginning="P1", seconds=7)
     with pytest.raises(ScenarioError, match="no group 'X'"):
-        edits.set_intergreen(one, LIGHTS, JUNCTION, ending="X", beginning="F1", seconds=7)
+        edits.set_intergreen(one, LIGHTS, JUNCTION, ending="X", beginning="P1", seconds=7)
 
 
 def test_a_cycle_that_is_said_grows_with_an_intergreen() -> None:
     new = edits.set_intergreen(
-        empty(program()), LIGHTS, JUNCTION, ending="K2", beginning="F1", seconds=11
+        empty(program()), LIGHTS, JUNCTION, ending="V2", beginning="P1", seconds=11
     )
     assert [plan.cycle for plan in timing(new).plans] == [86.0, 78.0]
 
@@ -214,7 +214,7 @@ def test_a_stage_that_goes_takes_its_detectors_and_times_along() -> None:
     with pytest.raises(ScenarioError, match="has green in no stage"):
         edits.remove_stage(one, LIGHTS, JUNCTION, stage="3")
     with pytest.raises(InputError, match="has a stage '1' already"):
-        edits.add_stage(one, LIGHTS, JUNCTION, "1", protected=["K1L"], green=6)
+        edits.add_stage(one, LIGHTS, JUNCTION, "1", protected=["V1L"], green=6)
 
 
 def test_the_edits_of_the_guide_can_be_made_on_its_program() -> None:
@@ -226,9 +226,9 @@ def test_the_edits_of_the_guide_can_be_made_on_its_program() -> None:
     for data in json.loads(block):
         message = read_edit(data)
         one = EDIT_ENTRIES[message.kind].function(one, lights=LIGHTS, **message.arguments)
-    assert members(one)["K2L"] == ("r2 left",)
+    assert members(one)["V2L"] == ("r2 left",)
     assert timing(one).intergreens == (
-        ("K2", "F1", 9.0), ("K2L", "F1", 9.0), ("K4", "F1", 11.0),
+        ("V2", "P1", 9.0), ("V2L", "P1", 9.0), ("V4", "P1", 11.0),
     )  # fmt: skip
     assert [(d.id, d.before, d.gap) for d in timing(one).detectors] == [
         ("D1", 30.0, 3.0), ("D2", 25.0, 2.5),

@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 TWO: dict[str, Any] = {
     "junction": JUNCTION,
     "groups": [
-        {"id": "K1", "movements": ["r1"]},
-        {"id": "K3", "movements": ["r3"]},
-        {"id": "K2", "movements": ["r2"]},
-        {"id": "K4", "movements": ["r4"]},
-        {"id": "F1", "movements": ["walk r1"]},
-        {"id": "F2", "movements": ["walk r2"]},
-        {"id": "F3", "movements": ["walk r3"]},
-        {"id": "F4", "movements": ["walk r4"]},
+        {"id": "V1", "movements": ["r1"]},
+        {"id": "V3", "movements": ["r3"]},
+        {"id": "V2", "movements": ["r2"]},
+        {"id": "V4", "movements": ["r4"]},
+        {"id": "P1", "movements": ["walk r1"]},
+        {"id": "P2", "movements": ["walk r2"]},
+        {"id": "P3", "movements": ["walk r3"]},
+        {"id": "P4", "movements": ["walk r4"]},
     ],
     "stages": [
-        {"id": "1", "protected": ["F2", "F4"], "permissive": ["K1", "K3"], "green": 20},
-        {"id": "2", "protected": ["F1", "F3"], "permissive": ["K2", "K4"], "green": 15},
+        {"id": "1", "protected": ["P2", "P4"], "permissive": ["V1", "V3"], "green": 20},
+        {"id": "2", "protected": ["P1", "P3"], "permissive": ["V2", "V4"], "green": 15},
     ],
 }
 
@@ -156,7 +156,7 @@ def test_a_left_turn_gets_an_arrow_and_the_opposite_one_shares_its_stage() -> No
     assert timing(first).cycle == cycle(first) > cycle(one) + 6
     both = turned(first, "r3", "both")
     assert letters(both, "r3") == ["g", "G", "r"]
-    assert [stage.groups for stage in timing(both).stages][1] == ("K1L", "K3L")
+    assert [stage.groups for stage in timing(both).stages][1] == ("V1L", "V3L")
     back = turned(turned(both, "r1", "permissive"), "r3", "permissive")
     assert letters(back, "r1") == letters(back, "r3") == ["g", "r"]
     assert cycle(back) == cycle(one) == timing(back).cycle

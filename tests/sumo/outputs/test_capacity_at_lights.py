@@ -20,22 +20,22 @@ CYCLE, GREEN = 83.0, 37.0
 PROGRAM: dict[str, Any] = {
     "junction": "10001",
     "groups": [
-        {"id": "K1", "movements": ["r1 straight", "r1 right"]},
-        {"id": "K1L", "movements": ["r1 left"]},
-        {"id": "K2", "movements": ["r2"]},
-        {"id": "K3", "movements": ["r3 straight", "r3 right"]},
-        {"id": "K3L", "movements": ["r3 left"]},
-        {"id": "K4", "movements": ["r4"]},
-        *({"id": f"F{leg}", "movements": [f"walk r{leg}"]} for leg in (1, 2, 3, 4)),
+        {"id": "V1", "movements": ["r1 straight", "r1 right"]},
+        {"id": "V1L", "movements": ["r1 left"]},
+        {"id": "V2", "movements": ["r2"]},
+        {"id": "V3", "movements": ["r3 straight", "r3 right"]},
+        {"id": "V3L", "movements": ["r3 left"]},
+        {"id": "V4", "movements": ["r4"]},
+        *({"id": f"P{leg}", "movements": [f"walk r{leg}"]} for leg in (1, 2, 3, 4)),
     ],
     "stages": [
         {
             "id": "1",
-            "protected": ["F2", "F4"],
-            "permissive": ["K1", "K1L", "K3", "K3L"],
+            "protected": ["P2", "P4"],
+            "permissive": ["V1", "V1L", "V3", "V3L"],
             "green": 34,
         },
-        {"id": "2", "protected": ["F1", "F3"], "permissive": ["K2", "K4"], "green": 25},
+        {"id": "2", "protected": ["P1", "P3"], "permissive": ["V2", "V4"], "green": 25},
     ],
 }
 LEFT, OPPOSING = "r1>j10001>r4", "r3>j10001>r1"

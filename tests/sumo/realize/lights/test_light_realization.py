@@ -283,6 +283,6 @@ def test_what_lights_show_can_be_kept_as_json() -> None:
     shown = tuple(one.shown for one in realized_lights(scenario(program()), crossing().sumo))
     assert programs_from_json(programs_to_json(shown)) == shown
     (kept,) = shown
-    assert [group.id for group in kept.groups][:2] == ["K1", "K1L"]
+    assert [group.id for group in kept.groups][:2] == ["V1", "V1L"]
     assert kept.groups[0].movements == ("r1 right", "r1 straight")
     assert [plan.cycle for plan in kept.plans] == [76.0]

@@ -88,7 +88,7 @@ class ShownLight:
         groups = []
         for links in columns.values():
             walk = self._view.movements[links[0]].walk
-            name = f"{'F' if walk else 'K'}{next(names[walk])}"
+            name = f"{'P' if walk else 'V'}{next(names[walk])}"
             groups.append(self.group(name, tuple(links)))
         return tuple(groups)
 

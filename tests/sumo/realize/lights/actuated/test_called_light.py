@@ -60,13 +60,13 @@ def greens(seen: list[Shown], movement: int) -> list[tuple[float, float]]:
 def three_stages() -> SumoMap:
     """The crossing with another program of the map: people have a stage of their own."""
     groups = [
-        {"id": "K1", "movements": ["r1", "r3"]},
-        {"id": "K2", "movements": ["r2", "r4"]},
+        {"id": "V1", "movements": ["r1", "r3"]},
+        {"id": "V2", "movements": ["r2", "r4"]},
         {"id": "F", "movements": ["walk r1", "walk r2", "walk r3", "walk r4"]},
     ]
     stages = [
-        {"id": "1", "protected": ["K1"], "green": 20.0},
-        {"id": "2", "protected": ["K2"], "green": 10.0},
+        {"id": "1", "protected": ["V1"], "green": 20.0},
+        {"id": "2", "protected": ["V2"], "green": 10.0},
         {"id": "3", "protected": ["F"], "green": 7.0},
     ]
     program = DesignedProgram(
