@@ -151,7 +151,7 @@ test("a road user that cannot start somewhere comes with the reason", () => {
   );
   expect(startsOf(scenario([]), 2).reasonAt(0, 9, 1, true, "pedestrian")).toContain("outside the region");
   expect(startsOf(scenario([actor("a")]), 0).reasonAt(0, 0, 1, false, "car")).toContain("occupied");
-  expect(startsOf(scenario([]), 0).reasonAt(500, 0, 1, true, "pedestrian")).toContain("yellow");
+  expect(startsOf(scenario([]), 0).reasonAt(500, 0, 1, true, "pedestrian")).toContain("sidewalks");
 });
 
 test("a start moves along its lane past those who stand there, and not out of the region", () => {
