@@ -90,6 +90,7 @@ def test_the_server_keeps_to_its_schema(
         "case": "case-001",
         "job": "job-1",
         "simulator": "carla-native",
+        "template": "cut-in",
         "of": "openscenario",
         "junction": light,
         "item": item,
