@@ -229,11 +229,11 @@ def _say_differences(own: pl.DataFrame, figures: Sequence[str]) -> list[str]:
 def _say_group(group: StudyGroup, figures: Sequence[str]) -> str:
     """The first figure that differs or might, and all others that clearly do."""
     first, *others = figures
-    clear = [name for name in others if _differs(group.figures[name])]
+    clear = [name for name in others if _is_clear_difference(group.figures[name])]
     return "; ".join(_say_figure(group.figures[name]) for name in (first, *clear))
 
 
-def _differs(found: Confidence) -> bool:
+def _is_clear_difference(found: Confidence) -> bool:
     if found.mean is None or found.half_width is None:
         return False
     return abs(found.mean) > found.half_width
@@ -247,7 +247,7 @@ def _say_figure(found: Confidence) -> str:
     low, high = found.mean - found.half_width, found.mean + found.half_width
     unit, pairs = f" {figure.unit}" if figure.unit else "", f"{found.seeds:,} pairs of runs"
     digits = min(6, max(0, 1 - math.floor(math.log10(found.half_width or abs(found.mean) or 1.0))))
-    if not _differs(found):
+    if not _is_clear_difference(found):
         return (
             f"no clear difference of {figure.label} "
             f"({low:.{digits}f} to {high:.{digits}f}{unit}; {pairs})"

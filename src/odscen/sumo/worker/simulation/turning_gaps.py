@@ -298,6 +298,7 @@ class TurningGaps:
 
     def forget(self) -> None:
         """Let all give way as SUMO has it, before the state is saved."""
+        self._waiting.clear()
         for name in sorted(self._given):
             self._set_ignored(name, ())
 
@@ -409,12 +410,12 @@ class TurningGaps:
         self._waiting.pop(name, None)
 
     def _still_waits(self, name: str, lights: dict[str, str]) -> bool:
-        """Whether one who waited still does so in any case: at red, or for one who comes."""
+        """Whether one who waited stands, and still does so in any case: at red, or for another.
+
+        One who drives at red could not stop before it: it is in the junction soon.
+        """
         at_red, until = self._waiting[name]
-        if at_red is not None:
-            if self._shows_red(at_red, lights):
-                return True
-        elif self._step < until:
+        if self._step < until if at_red is None else self._shows_red(at_red, lights):
             with suppress(*self._errors):  # it may be gone
                 if self._speed_of(name) < _STILL:
                     return True
