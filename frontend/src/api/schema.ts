@@ -2537,7 +2537,7 @@ export interface components {
          *     time
          *         Seconds: since when.
          *     until
-         *         Seconds: until when; ``None`` for a unresolved queue, and if not inserted.
+         *         Seconds: until when; ``None`` for an unresolved queue, and if not inserted.
          *     actor
          *         Who was first in it.
          *     count
