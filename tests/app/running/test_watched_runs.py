@@ -7,15 +7,25 @@ import numpy as np
 import polars as pl
 import pytest
 
+from odscen.app.maps import load_map
 from odscen.app.running.runs import run
 from odscen.app.running.watched_runs import watch
 from odscen.app.scenarios import read_scenario
+from odscen.base.categories import Category
 from odscen.base.errors import ConflictError, ScenarioError
+from odscen.lanegraph.query import node_id
 from odscen.maps.store import Workspace
 from odscen.records.run_events import events_from_json
 from odscen.runs.finished_run import Run
+from odscen.runs.recorded import read_light_states
 from odscen.runs.run_settings import RunSettings
-from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.document.scenario_document import (
+    Actor,
+    Background,
+    Demand,
+    Scenario,
+    Simulation,
+)
 
 SETTINGS = RunSettings(until=20.0)
 
@@ -197,3 +207,108 @@ def test_a_program_ends_the_run_by_a_rule(
     assert (steps.run.status, steps.run.summary["stopped"]) == ("completed", False)
     assert steps.run.trajectories()["time"].max() == 5.0
     assert "rule_acted" in steps.run.events()["kind"].to_list()
+
+
+LIGHT, WESTWARD, NORTHWARD = "10001", "r1>r3", "r2>r4"
+"""The light of the crossing; the first of the two movements has green from 0 to 17 s."""
+
+
+def _towards_the_light(workspace: Workspace, path: Path) -> tuple[Scenario, str, int]:
+    """A car 100 m before its stop line; its light by SUMO id, and the letter for it."""
+    on = load_map(workspace.map("signal_crossing"))
+    light, lanes = on.lights[0], on.sumo.graph.lanes
+    keys = list(map(str, lanes.lanes.keys))
+    link, before, behind = next(
+        (link, *map(keys.index, one.lanes))
+        for link, one in enumerate(light.movements)
+        if one.name == WESTWARD and set(one.lanes) <= set(keys)
+    )
+    first, last = lanes.lanes.first_node[before : before + 2].tolist()
+    beyond = int(lanes.lanes.first_node[behind + 1]) - 2
+    spawn = max(first + 2, last - 1 - round(100.0 / lanes.spacing))
+    car = Actor(
+        id="van",
+        category=Category.CAR,
+        spawn=node_id(on.sumo.graph, spawn),
+        goal=node_id(on.sumo.graph, beyond),
+    )
+    simulation = Simulation(step_length=0.1)
+    changes = {"actors": (car,), "flows": (), "rules": (), "simulation": simulation}
+    return read_scenario(path).model_copy(update=changes), on.sumo.lights[0].id, link
+
+
+@pytest.mark.slow
+def test_a_program_switches_a_light_and_who_would_have_passed_stops(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    scenario, light, link = _towards_the_light(workspace, sampled)
+    settings = RunSettings(until=30.0)
+    speeds: dict[str, list[float]] = {"left alone": [], "switched": []}
+    shown: dict[float, str] = {}
+    runs = {}
+    for name, found in speeds.items():
+        with watch(workspace, scenario, settings=settings, name=name, out=tmp_path) as steps:
+            for step in steps:
+                found.extend(step.speed[step.ids == "van"])
+                if name == "switched":
+                    shown[round(step.time, 1)] = step.lights[light][link]
+                    if step.time == pytest.approx(2.0):
+                        steps.switch_light(LIGHT, NORTHWARD)
+        runs[name] = steps.run
+    assert min(speeds["left alone"][40:]) > 5.0
+    assert min(speeds["switched"][40:]) < 0.01
+    assert {shown[time] for time in (0.5, 1.0, 2.0)} <= set("gG")
+    assert {letter for time, letter in shown.items() if 2.1 < time < 17.0} == {"r"}
+    logged = read_light_states(runs["switched"].folder).filter(pl.col("light") == light)
+    changes = [(time, state[link]) for time, state in logged.select("time", "state").iter_rows()]
+    assert next(time for time, letter in changes if letter == "r") == pytest.approx(2.1, abs=0.11)
+    events = events_from_json((runs["switched"].folder / "events.json").read_text())
+    said = [(one.time, one.detail) for one in events if one.kind == "rule_acted"]
+    assert said == [(pytest.approx(2.0), f"light {LIGHT}: {NORTHWARD} green")]
+
+
+@pytest.mark.slow
+def test_what_is_wrong_with_a_switched_light_is_said_at_once(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    scenario, _, _ = _towards_the_light(workspace, sampled)
+    with watch(workspace, scenario, settings=RunSettings(until=2.0), out=tmp_path) as steps:
+        with pytest.raises(ConflictError, match="while a step is looked at"):
+            steps.switch_light(LIGHT, WESTWARD)
+        next(steps)
+        with pytest.raises(ScenarioError, match="no traffic light '7'; there are 10001"):
+            steps.switch_light("7", WESTWARD)
+        with pytest.raises(ScenarioError, match="has no movement 'r1>r9'; there are r1>r2, "):
+            steps.switch_light(LIGHT, "r1>r9")
+        with pytest.raises(ScenarioError, match="green needs a movement"):
+            steps.switch_light(LIGHT)
+        with pytest.raises(ScenarioError, match="shows"):
+            steps.switch_light(LIGHT, shows="blue")  # type: ignore[arg-type]
+        with pytest.raises(ScenarioError, match="no actor 'program'"):
+            steps.act("program", go={})
+
+
+@pytest.mark.slow
+def test_without_actors_lights_are_switched_too_and_vehicles_of_demand_act(
+    workspace: Workspace, sampled: Path, tmp_path: Path
+) -> None:
+    empty, light, _ = _towards_the_light(workspace, sampled)
+    demand = Demand(background=(Background(id="traffic", per_km=8.0),))
+    scenario = empty.model_copy(update={"actors": (), "demand": demand})
+    dark, named, speeds = set(), "", []
+    with watch(workspace, scenario, settings=RunSettings(until=20.0), out=tmp_path) as steps:
+        for step in steps:
+            if step.time == pytest.approx(2.0):
+                steps.switch_light(LIGHT, shows="off")
+            if step.time == pytest.approx(12.0):
+                steps.switch_light(LIGHT, shows="program")
+            if 3.0 < step.time < 12.0:
+                dark |= set(step.lights[light])
+            if not named and (step.speed > 5.0).any():
+                named = str(step.ids[step.speed > 5.0][0])
+                steps.act(named, brake={"by": 5.0})
+            speeds.extend(step.speed[step.ids == named])
+    assert dark <= set("oO")
+    assert set(step.lights[light]) & set("rgG")
+    assert speeds[-1] == 0.0
+    assert named not in {actor.id for actor in scenario.actors}

@@ -10,9 +10,10 @@ import queue
 import threading
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from odscen.app.running.runs import carry_out, check_given, prepare_run
+from odscen.base.categories import Category
 from odscen.base.errors import ConflictError
 from odscen.runs.new_run import refuse_finished_run
 from odscen.runs.run_settings import AS_DESIGNED
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.runner.in_step import Step
 
+_PROGRAM = "program"
+"""Who switches lights in the events of a run, if no actor does."""
 _LISTEN = 0.2
 """Wall seconds after which a wait looks for Ctrl-C, see ``run_jobs``."""
 
@@ -60,6 +63,7 @@ class WatchedRun:
         ground = ElevationLookup(self._map.sumo.graph, checked.entry.lane_table())
         self._in_step = InStep(self._prepared.plan, ground, self._hand_over, rules=True)
         self._rules = list(checked.scenario.rules)
+        self._others = {actor.id: Category(actor.category) for actor in self._prepared.plan.actors}
         self._steps: queue.SimpleQueue[Step | None] = queue.SimpleQueue()
         self._wanted = threading.Semaphore(0)
         self._closing = self._over = self._handed = False
@@ -106,7 +110,7 @@ class WatchedRun:
         Parameters
         ----------
         actor
-            Its id.
+            Its id, as in the ids of steps: of the scenario, of a flow or of demand.
         **action
             One kind of action with its fields: ``brake={"by": 6}``; several run together.
 
@@ -117,10 +121,37 @@ class WatchedRun:
         ConflictError
             If no step is being looked at.
         """
-        together = [{kind: part} for kind, part in action.items()]
-        then = together[0] if len(together) == 1 else {"together": together}
-        name = f"act-{len(self._rules) + 1}"
-        self.add_rule({"id": name, "actor": actor, "when": {"time": {"after": 0}}, "then": [then]})
+        self._give_rule(self._acting_rule(actor, action), self._others)
+
+    def switch_light(
+        self,
+        light: str,
+        movement: str | None = None,
+        *,
+        shows: Literal["green", "off", "program"] = "green",
+    ) -> None:
+        """Switch a traffic light with the next step; who is on the road does not matter.
+
+        Parameters
+        ----------
+        light
+            Its junction, as in signal programs.
+        movement
+            What gets green, ``r1>r2`` or ``walk r1``: the program jumps to the stage in which that
+            has green, and resumes from there. Only for ``green``, and necessary for it.
+        shows
+            ``off`` is right of way as without lights, ``program`` the program that ran before.
+
+        Raises
+        ------
+        ScenarioError
+            If the map has no such light, or the light no such movement.
+        ConflictError
+            If no step is being looked at.
+        """
+        asked = {"light": light, "shows": shows}
+        part = asked if movement is None else asked | {"movement": movement}
+        self._give_rule(self._acting_rule(_PROGRAM, {"signal": part}), {_PROGRAM: Category.CAR})
 
     def add_rule(self, rule: Mapping[str, Any]) -> None:
         """Add a rule, as in the scenario document, that holds from this step on.
@@ -132,16 +163,7 @@ class WatchedRun:
         ConflictError
             If no step is being looked at.
         """
-        if not self._handed or self._over:
-            raise ConflictError("rules are given while a step is looked at, inside the loop")
-        made = validated(StoryRule, rule)
-        known, on = self._checked.scenario, self._map
-        whole = known.model_copy(update={"rules": (*self._rules, made)})
-        region = Region.of(on.sumo.graph, known.roi)
-        refuse_errors(rule_problems(whole, region, on.lights))
-        alone = known.model_copy(update={"rules": (made,)})
-        self._in_step.add_rules(story_plan(alone, on.sumo).to_json())
-        self._rules.append(made)
+        self._give_rule(rule, self._others)
 
     def close(self) -> None:
         """Stop after the present step, and wait until results and report are written.
@@ -158,6 +180,26 @@ class WatchedRun:
         if not self._over:
             self._over = True
             self._refuse_error()
+
+    def _acting_rule(self, actor: str, action: Mapping[str, Any]) -> dict[str, Any]:
+        """Make the rule by which somebody does something at once."""
+        together = [{kind: part} for kind, part in action.items()]
+        then = together[0] if len(together) == 1 else {"together": together}
+        name = f"act-{len(self._rules) + 1}"
+        return {"id": name, "actor": actor, "when": {"time": {"after": 0}}, "then": [then]}
+
+    def _give_rule(self, rule: Mapping[str, Any], others: Mapping[str, Category]) -> None:
+        if not self._handed or self._over:
+            raise ConflictError("rules are given while a step is looked at, inside the loop")
+        made = validated(StoryRule, rule)
+        known, on = self._checked.scenario, self._map
+        index = len(self._rules)
+        whole = known.model_copy(update={"rules": (*self._rules, made)})
+        region = Region.of(on.sumo.graph, known.roi)
+        refuse_errors(rule_problems(whole, region, on.lights, only=index, others=others))
+        alone = known.model_copy(update={"rules": (made,)})
+        self._in_step.add_rules(story_plan(alone, on.sumo).to_json())
+        self._rules.append(made)
 
     def _wait_for_step(self) -> Step | None:
         while True:
@@ -222,7 +264,8 @@ def watch(
         (s) and arrays of shape ``(N,)`` of the road users under way, ``ids``, ``x``, ``y``, ``z``
         (m), ``hdg``, ``pitch`` (rad) of body centres in the OpenDRIVE frame, ``speed`` (m/s). When
         the block has ended, ``run`` is the finished run. ``act`` and ``add_rule`` of the run let
-        actors do what rules can say, from the step that is looked at on.
+        road users do what rules can say, from the step that is looked at on, and ``switch_light``
+        switches a traffic light.
 
     Raises
     ------

@@ -7,7 +7,7 @@ from collections import defaultdict
 from heapq import merge
 from itertools import islice
 from math import comb
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.categories import Category
 from odscen.base.errors import OdscenError
@@ -48,6 +48,7 @@ def rule_problems(
     lights: Sequence[Light] | None = None,
     *,
     only: int | None = None,
+    others: Mapping[str, Category] | None = None,
 ) -> Iterator[Problem]:
     """Yield everything wrong with the rules of a scenario (R74).
 
@@ -58,10 +59,16 @@ def rule_problems(
     only
         Place of the rule that is looked at, besides the ids of all: an edit of one rule then takes
         the same time however many others there are. All of them if not given.
+    others
+        Who else may be named, such as vehicles of demand in a run that is under way.
     """
-    known = {actor.id: actor.category for actor in scenario.actors}
-    flows = {flow.id for flow in scenario.flows}
     ids: dict[str, int] = {}
+    known = _KnownNames(
+        {actor.id: actor.category for actor in scenario.actors},
+        {flow.id for flow in scenario.flows},
+        {} if others is None else others,
+        ids,
+    )
     for index, rule in enumerate(scenario.rules):
         ids.setdefault(rule.id, index)
     for index, rule in enumerate(scenario.rules):
@@ -70,35 +77,40 @@ def rule_problems(
             message = f"id {rule.id!r} is taken by rules[{first}].id; give one of them another"
             yield error("duplicate_id", f"{where}.id", message)
         if only is None or index == only:
-            yield from _check_actor_name(rule.actor, f"{where}.actor", known, flows)
+            yield from _check_actor_name(rule.actor, f"{where}.actor", known)
             for part in rule_parts(rule, where):
-                yield from _check_part(part, rule, known, flows, ids, region)
+                yield from _check_part(part, rule, known, region)
                 yield from _check_signal(part, lights)
     if only is None:
         yield from _at_once(scenario)
 
 
+class _KnownNames(NamedTuple):
+    """Who and what rules may name: actors, flows, other road users, and ids of rules."""
+
+    actors: Mapping[str, Category]
+    flows: set[str]
+    others: Mapping[str, Category]
+    ids: Mapping[str, int]
+
+
 def _check_part(
-    found: RulePart,
-    rule: StoryRule,
-    known: Mapping[str, Category],
-    flows: set[str],
-    ids: Mapping[str, int],
-    region: Region,
+    found: RulePart, rule: StoryRule, known: _KnownNames, region: Region
 ) -> Iterator[Problem]:
     where, kind, part = found
     for name, actor in actors_of(part):
-        yield from _check_actor_name(actor, f"{where}.{name}", known, flows)
+        yield from _check_actor_name(actor, f"{where}.{name}", known)
     for name, place in places_of(part):
         if isinstance(place, str) and region.place(place) is None:
             message = f"the map has no node {place!r}; pick one"
             yield error("unknown_place", f"{where}.{name}", message, nodes=[place])
     if kind == "own":
         yield from _check_package_kind(found)
-    if kind == "rule" and (other := getattr(part, "id", None)) not in ids:
-        message = f"there is no rule {other!r}; there are {_list_names(list(ids))}"
+    if kind == "rule" and (other := getattr(part, "id", None)) not in known.ids:
+        message = f"there is no rule {other!r}; there are {_list_names(list(known.ids))}"
         yield error("unknown_rule", f"{where}.id", message)
-    category, action = known.get(rule.actor), ACTIONS.get(kind)
+    category = known.actors.get(rule.actor) or known.others.get(rule.actor)
+    action = ACTIONS.get(kind)
     if ".then[" in where and action is not None and category is not None:
         on_foot = category is Category.PEDESTRIAN
         if (action.persons_only and not on_foot) or (action.vehicles_only and on_foot):
@@ -106,7 +118,7 @@ def _check_part(
             message = f"{kind!r} is for {who}; {rule.actor!r} is a {category}"
             yield error("action_not_possible", where, message)
         yield from _check_goal(found, rule.actor, region, on_foot=on_foot)
-    if kind == "appear" and ".then[" in where and rule.actor not in known:
+    if kind == "appear" and ".then[" in where and rule.actor not in known.actors:
         message = f"{rule.actor!r} is of a flow, which says when it departs; let an actor appear"
         yield error("action_not_possible", where, message)
 
@@ -139,13 +151,13 @@ def _check_goal(found: RulePart, actor: str, region: Region, *, on_foot: bool) -
         yield error("action_not_possible", f"{found.where}.to", message, nodes=[str(node)])
 
 
-def _check_actor_name(
-    name: str, where: str, known: Mapping[str, Category], flows: set[str]
-) -> Iterator[Problem]:
+def _check_actor_name(name: str, where: str, known: _KnownNames) -> Iterator[Problem]:
     flow, _, number = name.rpartition(".")
-    if name in known or (flow in flows and number.isdigit()):
+    if name in known.actors or name in known.others:
         return
-    message = f"there is no actor {name!r}; there are {_list_names(sorted(known))}"
+    if flow in known.flows and number.isdigit():
+        return
+    message = f"there is no actor {name!r}; there are {_list_names(sorted(known.actors))}"
     yield error("unknown_actor", where, message)
 
 
