@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from odscen.app.generators import installed_generators
+from odscen.reports.signal_sheet import legend_shapes
 from odscen.scenario.templates.template_registry import TEMPLATES
 from odscen.sumo.worker.behaviour.behaviour_doors import installed_behaviours
 from odscen.web.routes.figure_routes import actor_measures, figures
@@ -49,6 +50,8 @@ def _registered() -> Iterator[str]:
         yield from (template.title, template.summary, template.needs)
         for number in template.parameters:
             yield from (number.title, number.meaning)
+    for _, words in legend_shapes(()):
+        yield words
     for one in (*installed_generators(), *installed_behaviours()):
         yield one.summary
         for option in one.options:

@@ -22,6 +22,7 @@ from odscen.scenario.document.json_form import dumps
 from tests.browser.conftest import CROSSING
 from tests.browser.fault_line import FaultLine
 from tests.browser.pages import OdscenPage
+from tests.browser.test_signals import LIGHT
 from tests.signal_case import JUNCTION
 
 OUTSIDE = "r4"
@@ -153,7 +154,7 @@ class NameMeasure(Work):
 class LengthenGreen(Work):
     def begin(self, user: OdscenPage) -> None:
         user.open_first_light()
-        light = user.page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
+        light = user.page.get_by_role("region", name=LIGHT)
         green = light.get_by_role("slider", name="Green of stage 1")
         expect(green).to_be_visible()
         box = green.bounding_box()

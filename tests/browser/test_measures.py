@@ -99,7 +99,7 @@ def test_a_turn_a_lane_and_a_point_are_picked_on_the_map(user: OdscenPage, cross
     what.get_by_text("Turn", exact=True).click()
     user.page.get_by_role("button", name="Choose it on the map").click()
     user.map.click(user.graph.middle("r2"))
-    expect(user.page.get_by_text("From r2: click the road")).to_be_visible()
+    expect(user.page.get_by_text("From North Street, north of East")).to_be_visible()
     with user.changing():
         user.map.click(user.graph.middle("r1"))
     lane = outer_lane(user, "r3")

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Locator, expect
 
 from tests.browser.pages import OdscenPage
-from tests.browser.test_signals import AT_STOP_LINE, JUNCTION
+from tests.browser.test_signals import AT_STOP_LINE, LIGHT
 
 HIGH = 900
 GROUPS = ("Place", "Traffic", "Control", "Evaluate")
@@ -47,7 +47,7 @@ def test_a_click_on_a_signal_in_the_step_of_the_region_keeps_its_junction(
     user.step("Region").click()
     before = user.document()["roi"]
     user.map.click(AT_STOP_LINE)
-    light = user.page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
+    light = user.page.get_by_role("region", name=LIGHT)
     expect(light).to_be_visible()
     expect(user.step("Traffic lights")).to_have_attribute("aria-expanded", "true")
     assert user.document()["roi"] == before

@@ -20,7 +20,7 @@ from tests.browser.test_rule_scenes import (
     node_near,
     placed,
 )
-from tests.browser.test_signals import drag
+from tests.browser.test_signals import LIGHT, drag
 from tests.signal_case import JUNCTION
 
 __all__ = ["crossing"]
@@ -79,7 +79,7 @@ def close_a_lane(user: OdscenPage, hand: Hand, lane: str) -> None:
 def lengthen_a_green(user: OdscenPage, hand: Hand) -> None:
     opened(user, hand, "Traffic lights")
     hand.press(user.first_light)
-    light = user.page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
+    light = user.page.get_by_role("region", name=LIGHT)
     green, cycle = (light.get_by_role("slider", name=n) for n in ("Green of stage 1", "Cycle"))
     before = float((green.get_attribute("aria-valuetext") or "").split()[0])
     span = 1.25 * float((cycle.get_attribute("aria-valuetext") or "").split()[0])

@@ -85,12 +85,13 @@ def test_a_program_is_made_part_by_part_with_the_bytes_of_the_file_and_undone(
     new.get_by_label("Name").fill("V2L")
     turns = new.get_by_label("Turns and crossings").first
     turns.focus()
-    page.keyboard.type("r2 left")
+    page.keyboard.type("north, left")
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")
     with user.changing():
         new.get_by_role("button", name="Add the group").press("Enter")
-    expect(groups.get_by_role("region", name="Signal group V2L")).to_contain_text("r2 left")
+    group = groups.get_by_role("region", name="Signal group V2L")
+    expect(group).to_contain_text("from the north: left turn")
 
     # An intergreen: shorter than computed is refused at the matrix, longer is kept.
     matrix = unfold(light, "Change intergreens")

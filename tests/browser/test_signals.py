@@ -15,6 +15,8 @@ from tests.browser.pages import OdscenPage
 from tests.signal_case import JUNCTION, program, scenario
 from tools.page import Served
 
+LIGHT = "Traffic light at East Street / North Street"
+
 AT_STOP_LINE = (22.0, 3.25)
 
 
@@ -35,7 +37,7 @@ def test_a_click_on_a_signal_shows_its_program_and_a_run_where_it_is_in_its_cycl
     page = user.page
     user.open_editor(saved(served))
     user.open_first_light()
-    light = page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
+    light = page.get_by_role("region", name=LIGHT)
     expect(light).to_be_focused()
     expect(light.get_by_role("img", name=re.compile("^stage "))).to_have_count(4)
     expect(light.get_by_role("img", name="Signal timing plan of junction")).to_be_visible()
@@ -71,7 +73,7 @@ def open_program(user: OdscenPage, scenario: str) -> Locator:
     """Open the program of the crossing's light in the editor."""
     user.open_editor(scenario)
     user.open_first_light()
-    light = user.page.get_by_role("region", name=f"Traffic light of junction {JUNCTION}")
+    light = user.page.get_by_role("region", name=LIGHT)
     expect(light.get_by_role("slider", name="Cycle")).to_be_visible()
     return light
 

@@ -92,7 +92,7 @@ def test_a_study_of_a_changed_light_and_a_closure_goes_from_drop_to_intervals_by
     after = user.scenario
     assert before != after
     user.open_first_light()
-    light = page.get_by_role("region", name=re.compile("^Traffic light of junction"))
+    light = page.get_by_role("region", name=re.compile("^Traffic light at"))
     green = light.get_by_role("slider", name="Green of stage 1")
     was = green.get_attribute("aria-valuetext")
     with user.changing():

@@ -58,7 +58,8 @@ def test_vehicles_from_outside_are_added_where_lanes_lead_in(
 ) -> None:
     open_traffic(user, crossing)
     user.page.get_by_role("button", name="Add vehicle inputs").click()
-    user.choose("Where they drive in", "r2, 2 lanes")
+    place = "North Street, north of East Street / North Street (r2), 2 lanes"
+    user.choose("Where they drive in", place)
     with user.changing():
         user.page.get_by_role("button", name="Add", exact=True).click()
     card = user.page.get_by_role("region", name="Vehicle input input", exact=True)
@@ -189,7 +190,7 @@ def test_the_fit_to_counts_is_shown_with_its_places(
     unmet = user.page.get_by_role("table", name="Counts that are not met")
     expect(unmet).to_contain_text("add up to 900")
     before = user.map.view()
-    unmet.get_by_role("button", name="r1 > j10001 > r2").click()
+    unmet.get_by_role("button", name=", from the east to the north").click()
     expect(user.map.area).not_to_have_attribute("data-view", " ".join(f"{v:g}" for v in before))
     user.page.get_by_role("tab", name="Result").click()
     user.result.get_by_text("Download the results").click()

@@ -26,7 +26,9 @@ from odscen.reports.front_page import (
 )
 from odscen.reports.place_names import (
     NO_NAMES,
+    JunctionName,
     PlaceNames,
+    RoadName,
     _tell_apart,
     compass_point,
     place_names,
@@ -117,6 +119,8 @@ def test_a_shipped_map_is_named_by_its_streets(tmp_path):
     assert sides == {"east", "north", "west", "south"}
     west = next(leg for leg, name in names.segments.items() if name.startswith("West Street"))
     assert names.name_segment(west) == "West Street, west of East Street / North Street"
+    assert names.junction_names[junction] == JunctionName(("East Street", "North Street"))
+    assert names.road_names[west] == RoadName("West Street", ((junction, ""),), "west")
     nameless = place_names(graph, {})
     assert nameless.name_junction(junction) == f"Junction {junction.removeprefix('j')}"
     turns = [

@@ -14,6 +14,7 @@ from odscen.app.removal import remove
 from odscen.lanegraph.query import node_ids
 from odscen.maps.store import Workspace
 from odscen.web.application import create_app
+from odscen.web.wire.map_messages import MapNames
 from tests import own_importer
 from tests.opendrive.snippets import document, lane, road, section
 from tests.own_importer import PLACE
@@ -91,6 +92,24 @@ def test_a_map_tells_its_lights_as_the_live_view_names_them(client: TestClient) 
     assert light["names"] == ["10001"]
     assert len(light["green"]) > 1
     assert [name for names in light["signals"] for name in names]
+
+
+def test_names_of_places_come_in_parts_that_any_language_can_put_together(
+    client: TestClient,
+) -> None:
+    answer = client.get(f"/api/maps/{CROSSING}/names")
+    names = MapNames.model_validate_json(answer.content, extra="forbid")
+    (junction,) = names.junctions
+    assert (junction.id, junction.which) == ("j10001", "")
+    assert junction.streets == ["East Street", "North Street"]
+    assert sorted(leg.side for leg in junction.legs) == ["east", "north", "south", "west"]
+    west = next(leg.segment for leg in junction.legs if leg.side == "west")
+    road = next(road for road in names.roads if road.id == west)
+    assert (road.street, road.side) == ("West Street", "west")
+    assert [(end.junction, end.street) for end in road.ends] == [("j10001", "")]
+    again = {"if-none-match": answer.headers["etag"]}
+    assert client.get(f"/api/maps/{CROSSING}/names", headers=again).status_code == 304
+    assert client.get("/api/maps/nowhere/names").status_code == 404
 
 
 @pytest.mark.slow

@@ -133,7 +133,7 @@ def _program(camera: Camera) -> Locator:
     user.open_editor(scenarios.LIT)
     page.get_by_role("button", name="Hide the table").click()
     user.open_first_light()
-    light = page.get_by_role("region", name="Traffic light of junction")
+    light = page.get_by_role("region", name="Traffic light at")
     expect(light.get_by_role("slider", name="Cycle")).to_be_visible()
     return light
 

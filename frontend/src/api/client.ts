@@ -105,6 +105,7 @@ export const api = {
   map: (name: string) => call("get", "/api/maps/{name}", { params: { path: { name } } }),
   drawing: (name: string) => call("get", "/api/maps/{name}/drawing", { params: { path: { name } } }),
   graph: (name: string) => call("get", "/api/maps/{name}/graph", { params: { path: { name } } }),
+  names: (name: string) => call("get", "/api/maps/{name}/names", { params: { path: { name } } }),
   heights: (name: string) => call("get", "/api/maps/{name}/heights", { params: { path: { name } } }),
   addMap: (file: File, converter: Converter) =>
     call("post", "/api/maps", { body: form({ file, converter }) }),

@@ -70,6 +70,13 @@ export interface paths {
          */
         get: operations["heights_api_maps__name__heights_get"];
     };
+    "/api/maps/{name}/names": {
+        /**
+         * Names
+         * @description Names of the map's junctions and roads by streets and the compass, in parts.
+         */
+        get: operations["names_api_maps__name__names_get"];
+    };
     "/api/maps/{name}/report": {
         /**
          * Report
@@ -2642,6 +2649,17 @@ export interface components {
         };
         JsonPart: unknown;
         /**
+         * @description What the name of a junction is made of: at most two streets that meet, none if nameless.
+         *
+         *     ``which`` is a side, or the id, where several junctions meet the same streets; else empty.
+         */
+        JunctionNameInfo: {
+            id: string;
+            streets: string[];
+            which: string;
+            legs: components["schemas"]["LegInfo"][];
+        };
+        /**
          * @description The traffic light of one junction, where it differs from the map's program.
          *
          *     ``junction`` is the id of the OpenDRIVE junction, or the SUMO id of a light that is in none.
@@ -2799,6 +2817,12 @@ export interface components {
             /** @default 3 */
             over: number;
         };
+        /** @description A road segment at a junction, and the side of the junction on which it lies. */
+        LegInfo: {
+            segment: string;
+            /** @enum {string} */
+            side: "east" | "north-east" | "north" | "north-west" | "west" | "south-west" | "south" | "south-east";
+        };
         /** @description A signal group: the letters of the light's states that are its own, and their movements. */
         LightGroupInfo: {
             id: string;
@@ -2934,6 +2958,11 @@ export interface components {
             };
             preview: string;
             outdated: boolean;
+        };
+        /** @description Names of the junctions and roads of a map, in parts, to be said in any language. */
+        MapNames: {
+            junctions: components["schemas"]["JunctionNameInfo"][];
+            roads: components["schemas"]["RoadNameInfo"][];
         };
         /**
          * @description A place on the ground.
@@ -3882,6 +3911,11 @@ export interface components {
             kind: "move_road_end";
             to: components["schemas"]["MapPlace"];
         };
+        /** @description A junction at the end of a road, and the one street that crosses there; else empty. */
+        RoadEndInfo: {
+            junction: string;
+            street: string;
+        };
         /** @description Paint the border that is nearest to the place: ``solid``, ``broken``, ``none``, ... */
         RoadMarkEdit: {
             at: components["schemas"]["MapPlace"];
@@ -3893,6 +3927,17 @@ export interface components {
             /** @enum {string} */
             mark: "none" | "solid" | "broken" | "solid solid" | "solid broken" | "broken solid" | "broken broken" | "curb";
             lane_change?: ("both" | "increase" | "decrease" | "none") | null;
+        };
+        /**
+         * @description What the name of a road segment is made of; ``street`` is empty if it has none.
+         *
+         *     ``side`` is that of the first junction on which it lies; empty without a junction.
+         */
+        RoadNameInfo: {
+            id: string;
+            street: string;
+            ends: components["schemas"]["RoadEndInfo"][];
+            side: ("east" | "north-east" | "north" | "north-west" | "west" | "south-west" | "south" | "south-east") | "";
         };
         /**
          * @description A stretch with a lower limit (m/s), closed lanes, or narrowed ones.
@@ -6213,6 +6258,25 @@ export interface operations {
             200: {
                 content: {
                     "application/json": components["schemas"]["HeightColumns"];
+                };
+            };
+            /** @description What the client has is right. */
+            304: {
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    names_api_maps__name__names_get: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                content: {
+                    "application/json": components["schemas"]["MapNames"];
                 };
             };
             /** @description What the client has is right. */

@@ -23,6 +23,9 @@ export type NetworkOrigin = Schemas["NetworkOrigin"];
 export type Converter = Exclude<NetworkOrigin["converter"], "file"> | null;
 export type MapDetails = Schemas["MapDetails"];
 export type GraphColumns = Schemas["GraphColumns"];
+/** What the names of the places of a map are made of. */
+export type MapNames = Schemas["MapNames"];
+export type Side = Schemas["LegInfo"]["side"];
 export type HeightColumns = Schemas["HeightColumns"];
 export type WalkColumns = Schemas["WalkColumns"];
 export type PackedLines = Schemas["PackedLines"];

@@ -183,6 +183,7 @@ export function Editor({
           <SignalPanel
             junctions={now.lights.junctions}
             junction={now.light}
+            places={now.graph.names}
             onJunction={now.showLight}
             load={loadProgram}
             editing={lightEditing}

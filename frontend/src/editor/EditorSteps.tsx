@@ -228,6 +228,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
                 store={store}
                 document={document}
                 roads={roads}
+                places={graph.names}
                 profiles={profiles}
                 onEdit={changes.change}
                 onShow={sights.segments}
@@ -259,6 +260,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
           body: (
             <LightsStep
               junctions={junctions}
+              places={graph.names}
               shown={now.light}
               control={document.signals.control}
               onEdit={changes.change}
@@ -274,6 +276,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
             <MeasuresStep
               measures={measures}
               lights={now.lights?.junctions ?? []}
+              places={graph.names}
               pick={now.pick}
               onEdit={changes.change}
               onShow={sights.measure}
@@ -343,6 +346,7 @@ function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, o
               name={name}
               version={version}
               document={document}
+              places={graph.names}
               choices={choices}
               blocked={errors > 0}
               busy={starting}

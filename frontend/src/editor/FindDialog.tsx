@@ -12,6 +12,9 @@ import { findAll, type Found } from "./find";
 /** Something that is listed: a place or road user, or a command. */
 type Entry = { found: Found } | { command: Command };
 
+/** The kind, with the id if that is not the name. */
+const ofFound = ({ kind, id, name }: Found): string => (name === id ? kind : `${kind} ${id}`);
+
 /**
  * Goes to a road, a junction or a road user by its name, or does what is named; arrow keys choose among
  * what is found.
@@ -86,8 +89,8 @@ export function FindDialog({
             aria-selected={n === chosen}
             onClick={() => go(one)}
           >
-            <b>{"command" in one ? one.command.label : one.found.id}</b>
-            <span>{"command" in one ? one.command.keys : one.found.kind}</span>
+            <b>{"command" in one ? one.command.label : one.found.name}</b>
+            <span>{"command" in one ? one.command.keys : ofFound(one.found)}</span>
           </div>
         ))}
       </div>

@@ -5,6 +5,7 @@ import { useEffect, useState } from "react";
 
 import { type Demand, demand as api, type Entry, type VehicleInput } from "../api/demand";
 import type { Edit, FieldsOf } from "../api/types";
+import type { PlaceNames } from "../map/placeNames";
 import { reasonOf } from "../ui/reason";
 import { Committed } from "./Committed";
 import { ProfileChoice, type Profiles } from "./DayProfiles";
@@ -18,12 +19,14 @@ const PER_LANE = 600;
 /** Vehicles that drive in at the boundary of the region: how many, when, and their mix. */
 export function InputForm({
   input,
+  places,
   profiles,
   onEdit,
   onShow,
   onRemove,
 }: {
   input: VehicleInput;
+  places: PlaceNames;
   profiles: Profiles;
   onEdit: (edit: Edit) => void;
   onShow: (segments: readonly string[]) => void;
@@ -34,7 +37,7 @@ export function InputForm({
   const lanes = input.lanes.length
     ? t` on ${plural(input.lanes.length, { one: "# lane", other: "# lanes" })}`
     : "";
-  const note = t`on ${input.segment}${input.direction ? `, ${input.direction}` : ""}${lanes}`;
+  const note = t`on ${places.road(input.segment)}${input.direction ? `, ${input.direction}` : ""}${lanes}`;
   return (
     <PartCard name={input.id} what={t`Vehicle input`} note={note} onRemove={onRemove}>
       {input.per_hour === null ? (
@@ -95,11 +98,13 @@ export function InputForm({
 /** Chooses the place of a new input among those where lanes lead into the region. */
 export function NewInput({
   store,
+  places,
   demand,
   onEdit,
   onShow,
 }: {
   store: EditorStore;
+  places: PlaceNames;
   demand: Demand;
   onEdit: (edit: Edit) => void;
   onShow: (segments: readonly string[]) => void;
@@ -134,7 +139,7 @@ export function NewInput({
         data={entries.map((one) => ({
           value: keyOf(one),
           label:
-            `${one.segment}, ${plural(one.lanes.length, { one: "# lane", other: "# lanes" })}` +
+            `${places.placeWithId(one.segment)}, ${plural(one.lanes.length, { one: "# lane", other: "# lanes" })}` +
             (both(one.segment) ? `, ${one.direction}` : ""),
         }))}
         value={chosen}

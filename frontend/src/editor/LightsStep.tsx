@@ -4,6 +4,8 @@ import { Trans } from "@lingui/react/macro";
 
 import type { Edit, ScenarioDocument } from "../api/types";
 import { localized } from "../language/localized";
+import type { PlaceNames } from "../map/placeNames";
+import { byNameOrId, junctionChoices } from "../ui/choices";
 
 const CONTROLS = localized(() => [
   { value: "fixed", label: t`Fixed-time` },
@@ -21,12 +23,14 @@ export const lightsNote = (junctions: readonly string[]): string =>
 /** The traffic lights of the map: how all are controlled, and the program of each junction. */
 export function LightsStep({
   junctions,
+  places,
   shown,
   control,
   onEdit,
   onShow,
 }: {
   junctions: readonly string[];
+  places: PlaceNames;
   /** The junction whose program is open. */
   shown: string | null;
   control: ScenarioDocument["signals"]["control"];
@@ -39,6 +43,7 @@ export function LightsStep({
         <Trans>This map has no traffic lights.</Trans>
       </Text>
     );
+  const choices = junctionChoices(places, junctions);
   return (
     <>
       <Text size="sm">
@@ -48,24 +53,29 @@ export function LightsStep({
         <Select
           label={t`Junction`}
           placeholder={t`Choose a junction`}
-          data={[...junctions]}
+          data={choices}
           value={shown}
           searchable
+          filter={byNameOrId}
           onChange={(junction) => {
             if (junction) onShow(junction);
           }}
         />
       ) : (
         <Group gap={6} role="group" aria-label={t`Junctions with a traffic light`}>
-          {junctions.map((junction) => (
+          {choices.map(({ value, label }) => (
             <Button
-              key={junction}
+              key={value}
               size="compact-sm"
-              variant={junction === shown ? "filled" : "default"}
-              aria-pressed={junction === shown}
-              onClick={() => onShow(junction)}
+              h="auto"
+              mih={26}
+              py={3}
+              variant={value === shown ? "filled" : "default"}
+              aria-pressed={value === shown}
+              styles={{ label: { whiteSpace: "normal", textAlign: "start" } }}
+              onClick={() => onShow(value)}
             >
-              <Trans>Junction {junction}</Trans>
+              {label}
             </Button>
           ))}
         </Group>

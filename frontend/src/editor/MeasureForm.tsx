@@ -2,6 +2,7 @@ import { Group, MultiSelect, SegmentedControl, Select, TagsInput } from "@mantin
 
 import { t } from "@lingui/core/macro";
 import { CATEGORIES, type Category, type Edit } from "../api/types";
+import type { PlaceNames } from "../map/placeNames";
 import { CATEGORY_WORD } from "../ui/words";
 import { Committed } from "./Committed";
 import { PartCard, WindowFields } from "./DemandParts";
@@ -17,6 +18,7 @@ export function MeasureCard({
   measure,
   taken,
   open,
+  places,
   pick,
   onOpen,
   onEdit,
@@ -26,13 +28,14 @@ export function MeasureCard({
   /** Ids of all measures. */
   taken: readonly string[];
   open: boolean;
+  places: PlaceNames;
   pick: PlacePick;
   onOpen: (id: string | null) => void;
   onEdit: (edit: Edit | readonly Edit[], label?: string) => void;
   onShow: () => void;
 }) {
   const { id } = measure;
-  const { detail, when } = inWords(measure);
+  const { detail, when } = inWords(measure, places);
   const change: Change = (next, label) => onEdit({ kind: "set_measure", measure: next }, label);
   const rename = (next: string): void => {
     if (!next || taken.includes(next)) return;

@@ -1,11 +1,12 @@
 import { Text } from "@mantine/core";
 
 import { Trans } from "@lingui/react/macro";
+import type { PlaceNames } from "../map/placeNames";
 import type { Measure } from "./measures";
 import { inWords } from "./measures";
 
 /** The measures of the scenario, with begin and end; their places are orange on the map. */
-export function MeasureList({ measures }: { measures: readonly Measure[] }) {
+export function MeasureList({ measures, places }: { measures: readonly Measure[]; places: PlaceNames }) {
   if (measures.length === 0) return null;
   return (
     <section aria-labelledby="measures">
@@ -14,7 +15,7 @@ export function MeasureList({ measures }: { measures: readonly Measure[] }) {
       </Text>
       <ul style={{ margin: 0, paddingLeft: 18 }}>
         {measures.map((measure) => {
-          const { title, detail, when } = inWords(measure);
+          const { title, detail, when } = inWords(measure, places);
           return (
             <li key={measure.id}>
               <Text size="sm">{title}</Text>

@@ -6,6 +6,8 @@ import { useState } from "react";
 import { localized } from "../language/localized";
 import type { Edit } from "../api/types";
 import { isKey } from "../lists";
+import type { PlaceNames } from "../map/placeNames";
+import { byNameOrId, junctionChoices } from "../ui/choices";
 import { useKeptForm } from "../ui/keptForm";
 import { MeasureCard } from "./MeasureForm";
 import { KIND, type Measure, newMeasure, picksOf } from "./measures";
@@ -30,6 +32,7 @@ export const PICK_WORD = localized((): Record<PickBy, string> => ({
 export function MeasuresStep({
   measures,
   lights,
+  places,
   pick,
   onEdit,
   onShow,
@@ -37,6 +40,7 @@ export function MeasuresStep({
   measures: readonly Measure[];
   /** Junctions with a traffic light. */
   lights: readonly string[];
+  places: PlaceNames;
   pick: PlacePick;
   onEdit: (edit: Edit | readonly Edit[], label?: string) => void;
   onShow: (measure: Measure) => void;
@@ -53,6 +57,7 @@ export function MeasuresStep({
           measure={measure}
           taken={measures.map(({ id }) => id)}
           open={open === measure.id}
+          places={places}
           pick={pick}
           onOpen={setOpen}
           onEdit={onEdit}
@@ -62,6 +67,7 @@ export function MeasuresStep({
       <NewMeasure
         measures={measures}
         lights={lights}
+        places={places}
         pick={pick}
         onAdd={(measure) => {
           onEdit({ kind: "set_measure", measure }, t`Add ${measure.id}`);
@@ -77,11 +83,13 @@ export function MeasuresStep({
 function NewMeasure({
   measures,
   lights,
+  places,
   pick,
   onAdd,
 }: {
   measures: readonly Measure[];
   lights: readonly string[];
+  places: PlaceNames;
   pick: PlacePick;
   onAdd: (measure: Measure) => void;
 }) {
@@ -135,9 +143,10 @@ function NewMeasure({
         {kind === "signal_outage" ? (
           <Select
             label={t`or its junction`}
-            data={[...lights]}
+            data={junctionChoices(places, lights)}
             value={null}
             searchable
+            filter={byNameOrId}
             onChange={(name) => {
               if (name) add(namedPlace(name));
             }}

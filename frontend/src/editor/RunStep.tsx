@@ -5,6 +5,7 @@ import { Trans } from "@lingui/react/macro";
 import { localized } from "../language/localized";
 import { models } from "../api/models";
 import type { Edit, ScenarioDocument } from "../api/types";
+import type { PlaceNames } from "../map/placeNames";
 import { CarlaChoice } from "../carla/CarlaChoice";
 import { driverWords } from "../ui/drivers";
 import { IconPlay } from "../ui/icons";
@@ -75,6 +76,7 @@ export function RunStep({
   name,
   version,
   document,
+  places,
   choices,
   blocked,
   empty,
@@ -85,6 +87,7 @@ export function RunStep({
   name: string;
   version: number;
   document: ScenarioDocument;
+  places: PlaceNames;
   choices: RunChoices;
   blocked: boolean;
   empty: boolean;
@@ -138,7 +141,7 @@ export function RunStep({
         allowDeselect={false}
         onChange={(value) => choose({ recording: value ?? "step" })}
       />
-      <MeasureList measures={measures} />
+      <MeasureList measures={measures} places={places} />
       <SimulatorChoice
         scenario={name}
         version={version}

@@ -125,7 +125,7 @@ function LineLanes({
             variant="subtle"
             color="gray"
             disabled={nodes.length === 1}
-            aria-label={t`Take ${node} out of ${inSentence(word)} of ${of}`}
+            aria-label={t`Take ${placeWord(graph, node)} out of ${inSentence(word)} of ${of}`}
             onClick={() => toggle(node)}
           >
             <IconTrash />

@@ -5,6 +5,7 @@ import { useState } from "react";
 
 import { parsedDayTime, dayTime } from "../language/units";
 import type { Edit, ScenarioDocument } from "../api/types";
+import type { PlaceNames } from "../map/placeNames";
 import { BackgroundForm } from "./BackgroundForm";
 import { InputForm, NewInput } from "./InputForm";
 import { bringsTraffic, freeName } from "./demand";
@@ -23,6 +24,7 @@ export function TrafficStep({
   store,
   document,
   roads,
+  places,
   profiles,
   onEdit,
   onShow,
@@ -30,6 +32,7 @@ export function TrafficStep({
   store: EditorStore;
   document: ScenarioDocument;
   roads: readonly string[];
+  places: PlaceNames;
   profiles: Profiles;
   onEdit: (edit: Edit) => void;
   /** Shows segments on the map. */
@@ -63,6 +66,7 @@ export function TrafficStep({
         <InputForm
           key={one.id}
           input={one}
+          places={places}
           profiles={profiles}
           onEdit={onEdit}
           onShow={onShow}
@@ -114,6 +118,7 @@ export function TrafficStep({
         {adding === "input" && (
           <NewInput
             store={store}
+            places={places}
             demand={demand}
             onShow={onShow}
             onEdit={(edit) => {

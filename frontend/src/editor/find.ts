@@ -9,6 +9,8 @@ import { isFlow } from "./placing";
 export interface Found {
   is: "segment" | "one";
   id: string;
+  /** By which it is called; its id if it has no other name. */
+  name: string;
   /** What it is, in a word. */
   kind: string;
 }
@@ -17,7 +19,7 @@ export interface Found {
 const MOST = 12;
 
 /**
- * Road users, roads and junctions whose id or kind has every word of a search in it: those with just
+ * Road users, roads and junctions whose id, name or kind has every word of a search in it: those with just
  * that id first, then those whose id begins with it, in the order of the scenario and of the map.
  */
 export function findAll(graph: Graph, ones: readonly (Actor | Flow)[], search: string): Found[] {
@@ -26,16 +28,21 @@ export function findAll(graph: Graph, ones: readonly (Actor | Flow)[], search: s
   if (last === undefined) return [];
   const ranks: Found[][] = [[], [], []];
   const look = (one: Found): void => {
-    const text = `${one.kind} ${one.id}`.toLowerCase();
+    const text = `${one.kind} ${one.id} ${one.name}`.toLowerCase();
     if (!words.every((word) => text.includes(word))) return;
     const id = one.id.toLowerCase();
     const bare = one.is === "segment" ? id.slice(1) : id;
     const rank = id === last || bare === last ? 0 : id.startsWith(last) || bare.startsWith(last) ? 1 : 2;
     ranks[rank]?.push(one);
   };
-  for (const one of ones) look({ is: "one", id: one.id, kind: kindOf(one) });
+  for (const one of ones) look({ is: "one", id: one.id, name: one.id, kind: kindOf(one) });
   for (const { id, kind } of graph.columns.segments)
-    look({ is: "segment", id, kind: kind === "junction" ? t`Junction` : t`Road` });
+    look({
+      is: "segment",
+      id,
+      name: kind === "junction" ? graph.names.junction(id) : graph.names.road(id),
+      kind: kind === "junction" ? t`Junction` : t`Road`,
+    });
   return ranks.flat().slice(0, MOST);
 }
 

@@ -4,6 +4,7 @@ import { lengthText, speedText } from "../language/units";
 import { localized } from "../language/localized";
 import type { ScenarioDocument } from "../api/types";
 import { clock } from "../language/moments";
+import type { PlaceNames } from "../map/placeNames";
 import type { PickBy, Picked } from "./pick";
 
 export type Measure = ScenarioDocument["measures"][number];
@@ -16,6 +17,8 @@ export const KIND = localized((): Record<Measure["kind"], string> => ({
   permission: t`Permission`,
   signal_outage: t`Signal out of order`,
 }));
+
+export const SHOWS = localized(() => ({ off: t`Off`, flashing: t`Flashing` }));
 
 /** Segments, lanes and turns that a measure names. */
 export function placesOf(measure: Measure): readonly string[] {
@@ -31,8 +34,9 @@ export function placesOf(measure: Measure): readonly string[] {
   }
 }
 
-function detail(measure: Measure): string {
-  const where = placesOf(measure).join(", ");
+function detail(measure: Measure, names: PlaceNames): string {
+  const said = (places: readonly string[]): string => places.map((one) => names.place(one)).join("; ");
+  const where = said(placesOf(measure));
   switch (measure.kind) {
     case "closure":
       return where;
@@ -45,10 +49,10 @@ function detail(measure: Measure): string {
         ? t`only ${measure.allowed.join(", ")}: ${where}`
         : t`no ${measure.banned.join(", ")}: ${where}`;
     case "signal_outage":
-      return t`junction ${measure.junction}, ${measure.shows}`;
+      return `${names.junction(measure.junction)}: ${SHOWS()[measure.shows]}`;
     case "roadworks":
       return [
-        measure.places.join(", "),
+        said(measure.places),
         ...(measure.speed === null ? [] : [speedText(measure.speed)]),
         ...(measure.width === null ? [] : [t`lanes ${lengthText(measure.width, 2)} wide`]),
         ...(measure.closed_lanes.length > 0 ? [t`closed lanes ${measure.closed_lanes.join(", ")}`] : []),
@@ -61,9 +65,12 @@ export const measureNote = (measures: readonly Measure[]): string =>
   measures.length === 0 ? t`None` : plural(measures.length, { one: "# measure", other: "# measures" });
 
 /** A measure in words: what it is, where, and when. */
-export const inWords = (measure: Measure): { title: string; detail: string; when: string } => ({
+export const inWords = (
+  measure: Measure,
+  names: PlaceNames,
+): { title: string; detail: string; when: string } => ({
   title: `${KIND()[measure.kind]} ${measure.id}`,
-  detail: detail(measure),
+  detail: detail(measure, names),
   when: t`${clock(measure.begin)} to ${measure.end === null ? t`the end` : clock(measure.end)}`,
 });
 

@@ -6,6 +6,7 @@ import { nth } from "../lists";
 import type { Graph } from "../map/graph";
 import { laneShape, turnShapes } from "../map/laneShapes";
 import type { ScenePin, SegmentStyle } from "../map/scene";
+import type { PlaceNames } from "../map/placeNames";
 import type { Heads } from "../signals/heads";
 import type { Measure } from "./measures";
 import { placesOf } from "./measures";
@@ -112,8 +113,8 @@ export function transitPins(graph: Graph, { stops, lines }: ScenarioDocument["tr
 }
 
 /** A sign in the middle of each junction with a traffic light. */
-export const lightPins = (lights: Heads | null): ScenePin[] =>
+export const lightPins = (lights: Heads | null, names: PlaceNames): ScenePin[] =>
   (lights?.junctions ?? []).flatMap((junction): ScenePin[] => {
     const middle = lights?.middle(junction);
-    return middle ? [{ ...middle, sign: "L", text: t`Junction ${junction}` }] : [];
+    return middle ? [{ ...middle, sign: "L", text: names.junction(junction) }] : [];
   });

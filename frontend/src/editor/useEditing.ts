@@ -85,7 +85,7 @@ export function useEditing(
   const { document, problems } = scenario;
   // What is shown below says moments as times of day if there is a clock.
   countFrom(document.demand.clock, document.simulation.duration);
-  namePlaces((node) => placeWord(graph, node));
+  namePlaces((node) => placeWord(graph, node), graph.names);
   const [step, setStep] = useState<Step>(() => keptStep() ?? firstStep(document));
   // A link selects who was selected when it was copied.
   useEffect(() => {

@@ -57,7 +57,7 @@ export function useScene(now: EditorNow): Scene {
     [graph, rules, placed, drafted],
   );
   const stations = useMemo(() => stationPins(graph, study), [graph, study]);
-  const signals = useMemo(() => lightPins(lights), [lights]);
+  const signals = useMemo(() => lightPins(lights, graph.names), [lights, graph]);
   const detectors = useMemo(() => sceneDetectors(program), [program]);
   return useMemo<Scene>(() => {
     const placing = step === "actors";

@@ -1,5 +1,6 @@
 import type { Bounds, GraphColumns, WalkColumns } from "../api/types";
 import { nth } from "../lists";
+import { NO_NAMES, type PlaceNames } from "./placeNames";
 
 /** A place on the map where something can start or go. */
 export interface Place {
@@ -30,7 +31,10 @@ export class Graph {
   readonly segmentRow = new Map<string, number>();
   private readonly places = new Map<string, Place>();
 
-  constructor(readonly columns: GraphColumns) {
+  constructor(
+    readonly columns: GraphColumns,
+    readonly names: PlaceNames = NO_NAMES,
+  ) {
     columns.segments.forEach((one, row) => this.segmentRow.set(one.id, row));
     for (let i = 0; i < columns.x.length; i++) this.put(this.vehiclePlace(i));
     for (let i = 0; i < columns.walks.x.length; i++) this.put(this.walkPlace(i));

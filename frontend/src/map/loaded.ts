@@ -2,6 +2,7 @@ import { api } from "../api/client";
 import type { PackedDrawing } from "./drawing";
 import { Graph } from "./graph";
 import { Picker } from "./picking";
+import { PlaceNames } from "./placeNames";
 
 export interface LoadedGraph {
   graph: Graph;
@@ -26,7 +27,8 @@ export const loadDrawing = (name: string): Promise<PackedDrawing> =>
 
 export const loadGraph = (name: string): Promise<LoadedGraph> =>
   kept(graphs, name, async () => {
-    const graph = new Graph(await api.graph(name));
+    const [columns, names] = await Promise.all([api.graph(name), api.names(name)]);
+    const graph = new Graph(columns, new PlaceNames(names));
     return { graph, picker: new Picker(graph) };
   });
 

@@ -6,6 +6,7 @@ import { useCallback, useEffect, useState } from "react";
 
 import { fixed } from "../language/numbers";
 import { type FitRow, runs } from "../api/runs";
+import type { PlaceNames } from "../map/placeNames";
 import { useLoaded } from "../ui/useLoaded";
 import { span } from "../language/moments";
 import { worstFirst } from "./fit";
@@ -18,10 +19,12 @@ const LISTED = 200;
 /** How well a run meets the counts of its scenario. */
 export function CountsFit({
   run,
+  places,
   onFit,
   onShow,
 }: {
   run: string;
+  places: PlaceNames;
   /** Called once they are known, and with null when they are out of sight. */
   onFit: (rows: readonly FitRow[] | null) => void;
   onShow: (x: number, y: number) => void;
@@ -103,7 +106,7 @@ export function CountsFit({
             </Table.Tr>
           </Table.Thead>
           {shown.slice(0, LISTED).map((row) => (
-            <Row key={`${row.counts} ${row.place} ${row.begin}`} row={row} onShow={onShow} />
+            <Row key={`${row.counts} ${row.place} ${row.begin}`} row={row} places={places} onShow={onShow} />
           ))}
         </Table>
       )}
@@ -119,18 +122,27 @@ export function CountsFit({
   );
 }
 
-function Row({ row, onShow }: { row: FitRow; onShow: (x: number, y: number) => void }) {
-  const { place, x, y, begin, end, counted, modelled, geh, why } = row;
+function Row({
+  row,
+  places,
+  onShow,
+}: {
+  row: FitRow;
+  places: PlaceNames;
+  onShow: (x: number, y: number) => void;
+}) {
+  const { x, y, begin, end, counted, modelled, geh, why } = row;
+  const name = places.place(row.place).replaceAll(">", " > ");
   return (
     <Table.Tbody className="fit-row">
       <Table.Tr>
         <Table.Th scope="row" fw={400}>
           {x !== null && y !== null ? (
             <button type="button" className="row-button" onClick={() => onShow(x, y)}>
-              {place.replaceAll(">", " > ")}
+              {name}
             </button>
           ) : (
-            place.replaceAll(">", " > ")
+            name
           )}
           <div className="fit-time">{span(begin, end)}</div>
         </Table.Th>

@@ -18,6 +18,7 @@ import { SafeSlices } from "./LongRun";
 import { Plots } from "./Plots";
 import { Result } from "./Result";
 import { RoadUsers } from "./RoadUsers";
+import type { PlaceNames } from "../map/placeNames";
 import type { Picture } from "./usePicture";
 
 interface Props {
@@ -43,6 +44,8 @@ interface Props {
   counts: number;
   onFit: (fit: readonly FitRow[] | null) => void;
   lights: RunLights;
+  /** Names of the places of the map. */
+  places: PlaceNames;
   junction: string | null;
   onJunction: (junction: string) => void;
   loadProgram: (junction: string) => Promise<LightProgram>;
@@ -78,6 +81,7 @@ export function RunSide({
   counts,
   onFit,
   lights,
+  places,
   junction,
   onJunction,
   loadProgram,
@@ -133,7 +137,7 @@ export function RunSide({
           <Plots run={run} />
         </Tabs.Panel>
         <Tabs.Panel value="counts" className="run-panel">
-          <CountsFit run={run} onFit={onFit} onShow={onPlace} />
+          <CountsFit run={run} places={places} onFit={onFit} onShow={onPlace} />
         </Tabs.Panel>
         <Tabs.Panel value="users" className="run-panel">
           {!ended && <SafeSlices info={info} />}
@@ -161,6 +165,7 @@ export function RunSide({
             <SignalPanel
               junctions={lights.heads.junctions}
               junction={junction}
+              places={places}
               onJunction={(next) => {
                 onJunction(next);
                 const middle = lights.heads?.middle(next);

@@ -12,6 +12,7 @@ import { MOST_ACTORS } from "../editor/scene";
 import { around } from "../editor/sights";
 import { countFrom } from "../language/moments";
 import type { Pointed } from "../map/MapCanvas";
+import { NO_NAMES } from "../map/placeNames";
 import { seenInLog } from "../signals/occupancy";
 import { sceneDetectors } from "../signals/sceneDetectors";
 import { useQueues } from "../signals/useQueues";
@@ -257,6 +258,7 @@ function Watched({ scenario, run, onResume }: { scenario: string; run: string; o
           counts={content?.counts ?? 0}
           onFit={setFit}
           lights={lights}
+          places={loaded?.graph.names ?? NO_NAMES}
           junction={shownJunction}
           onJunction={setJunction}
           loadProgram={loadProgram}

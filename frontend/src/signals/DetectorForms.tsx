@@ -6,6 +6,7 @@ import type { LightProgram } from "../api/signals";
 import { Committed } from "../editor/Committed";
 import { CommittedText, PickButton } from "../editor/FormParts";
 import { IconTrash } from "../ui/icons";
+import type { ApproachNames } from "../map/placeNames";
 import type { SignalEditing, Timing } from "./editing";
 import { freeName, stageLabel } from "./GroupForms";
 import { Refused } from "./Refused";
@@ -16,11 +17,12 @@ type Detector = Timing["detectors"][number];
 interface Props {
   light: LightProgram;
   junction: string;
+  names: ApproachNames;
   editing: SignalEditing;
 }
 
 /** Detectors of the scenario before a light: their places, and the stages that they prolong. */
-export function DetectorForms({ light, junction, editing }: Props) {
+export function DetectorForms({ light, junction, names, editing }: Props) {
   const detectors = editing.timing?.detectors ?? [];
   const attempt = useAttempt(editing);
   const id = freeName(new Set(detectors.map((one) => one.id)), "D");
@@ -41,7 +43,14 @@ export function DetectorForms({ light, junction, editing }: Props) {
         </Text>
       )}
       {detectors.map((one) => (
-        <DetectorForm key={one.id} one={one} light={light} junction={junction} editing={editing} />
+        <DetectorForm
+          key={one.id}
+          one={one}
+          light={light}
+          junction={junction}
+          names={names}
+          editing={editing}
+        />
       ))}
       <PickButton
         pick={editing.pick}
@@ -63,7 +72,7 @@ export function DetectorForms({ light, junction, editing }: Props) {
   );
 }
 
-function DetectorForm({ one, light, junction, editing }: Props & { one: Detector }) {
+function DetectorForm({ one, light, junction, names, editing }: Props & { one: Detector }) {
   const { id } = one;
   const attempt = useAttempt(editing);
   const set = { kind: "set_detector", junction, detector: id } as const;
@@ -100,7 +109,7 @@ function DetectorForm({ one, light, junction, editing }: Props & { one: Detector
         label={t`Approach or lane`}
         data={[...new Set([...places, one.at])].map((value) => ({
           value,
-          label: approach.has(value) ? t`${value}, each lane` : value,
+          label: approach.has(value) ? t`${names.approach(value)}, each lane` : names.lane(value),
         }))}
         value={one.at}
         allowDeselect={false}

@@ -7,6 +7,8 @@ import type { LightProgram } from "../api/signals";
 import { localized } from "../language/localized";
 import { Committed } from "../editor/Committed";
 import { CommittedText } from "../editor/FormParts";
+import type { ApproachNames } from "../map/placeNames";
+import { byNameOrId } from "../ui/choices";
 import type { SignalEditing, Timing } from "./editing";
 import { conflictWords, type Green, greenOf, type ProgramGroup, withGreen } from "./greens";
 import { Refused } from "./Refused";
@@ -15,6 +17,7 @@ import { useAttempt } from "./useAttempt";
 interface Props {
   light: LightProgram;
   junction: string;
+  names: ApproachNames;
   timing: Timing;
   editing: SignalEditing;
 }
@@ -29,7 +32,7 @@ const GREENS = localized((): { value: Green; label: string }[] => [
 ]);
 
 /** Signal groups of a program: their movements, least green, and the stages in which they are green. */
-export function GroupForms({ light, junction, timing, editing }: Props) {
+export function GroupForms({ light, junction, names, timing, editing }: Props) {
   const [open, setOpen] = useState<string | null>(null);
   return (
     <div className="signal-forms">
@@ -41,7 +44,7 @@ export function GroupForms({ light, junction, timing, editing }: Props) {
                 {group.id}
               </Text>
               <Text size="xs" c="dimmed">
-                {group.movements.join(", ")}
+                {names.movements(group.movements)}
               </Text>
             </div>
             <Button
@@ -59,6 +62,7 @@ export function GroupForms({ light, junction, timing, editing }: Props) {
             <GroupForm
               light={light}
               junction={junction}
+              names={names}
               timing={timing}
               editing={editing}
               group={group}
@@ -67,7 +71,14 @@ export function GroupForms({ light, junction, timing, editing }: Props) {
           )}
         </section>
       ))}
-      <NewGroup light={light} junction={junction} timing={timing} editing={editing} onMade={setOpen} />
+      <NewGroup
+        light={light}
+        junction={junction}
+        names={names}
+        timing={timing}
+        editing={editing}
+        onMade={setOpen}
+      />
       <StageList junction={junction} timing={timing} editing={editing} />
     </div>
   );
@@ -76,22 +87,23 @@ export function GroupForms({ light, junction, timing, editing }: Props) {
 function GroupForm({
   light,
   junction,
+  names,
   timing,
   editing,
   group,
   onName,
 }: Props & { group: ProgramGroup; onName: (name: string | null) => void }) {
   const { id } = group;
-  const names = useAttempt(editing);
+  const naming = useAttempt(editing);
   const members = useAttempt(editing);
   const times = useAttempt(editing);
   const greens = useAttempt(editing);
   const others = timing.groups.filter((one) => one.id !== id).map((one) => one.id);
   const set = { kind: "set_group", junction, group: id } as const;
   const rename = async (name: string): Promise<void> => {
-    if (others.includes(name)) names.say(t`${name} is taken`);
-    else if (name === "") names.say(t`A signal group needs a name`);
-    else if (await names.ask([{ ...set, id: name }])) onName(name);
+    if (others.includes(name)) naming.say(t`${name} is taken`);
+    else if (name === "") naming.say(t`A signal group needs a name`);
+    else if (await naming.ask([{ ...set, id: name }])) onName(name);
   };
   const choose = (stage: string, green: Green): void => {
     const one = timing.stages.find((each) => each.id === stage);
@@ -117,9 +129,10 @@ function GroupForm({
   return (
     <>
       <CommittedText label={t`Name`} value={id} maxLength={64} onCommit={(name) => void rename(name)} />
-      <Refused by={names} />
+      <Refused by={naming} />
       <MovementSelect
         light={light}
+        names={names}
         group={id}
         value={movementsOf(light, id)}
         onChange={(movements) => {
@@ -189,7 +202,14 @@ function GroupForm({
   );
 }
 
-function NewGroup({ light, junction, timing, editing, onMade }: Props & { onMade: (name: string) => void }) {
+function NewGroup({
+  light,
+  junction,
+  names,
+  timing,
+  editing,
+  onMade,
+}: Props & { onMade: (name: string) => void }) {
   const [open, setOpen] = useState(false);
   const [name, setName] = useState("");
   const [movements, setMovements] = useState<string[]>([]);
@@ -224,7 +244,7 @@ function NewGroup({ light, junction, timing, editing, onMade }: Props & { onMade
         maxLength={64}
         onChange={(event) => setName(event.currentTarget.value)}
       />
-      <MovementSelect light={light} group={id} value={movements} onChange={setMovements} />
+      <MovementSelect light={light} names={names} group={id} value={movements} onChange={setMovements} />
       <Text size="xs" c="dimmed">
         <Trans>
           It is green with the group that has the first of them now, until you choose other stages.
@@ -246,25 +266,31 @@ function NewGroup({ light, junction, timing, editing, onMade }: Props & { onMade
 /** Movements of a group: those of others are taken from them. */
 function MovementSelect({
   light,
+  names,
   group,
   value,
   onChange,
 }: {
   light: LightProgram;
+  names: ApproachNames;
   group: string;
   value: string[];
   onChange: (movements: string[]) => void;
 }) {
-  const data = light.movements.map((one) => ({
-    value: one.name,
-    label: one.group && one.group !== group ? t`${one.name} (now in ${one.group})` : one.name,
-  }));
+  const data = light.movements.map((one) => {
+    const label = names.movement(one.name);
+    return {
+      value: one.name,
+      label: one.group && one.group !== group ? t`${label} (now in ${one.group})` : label,
+    };
+  });
   return (
     <MultiSelect
       label={t`Turns and crossings`}
       data={data}
       value={value}
       searchable
+      filter={byNameOrId}
       hidePickedOptions
       onChange={onChange}
     />
@@ -272,7 +298,7 @@ function MovementSelect({
 }
 
 /** The stages in their order, to be taken out. */
-function StageList({ junction, timing, editing }: Omit<Props, "light">) {
+function StageList({ junction, timing, editing }: Omit<Props, "light" | "names">) {
   const attempt = useAttempt(editing);
   return (
     <>

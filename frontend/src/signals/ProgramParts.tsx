@@ -3,6 +3,7 @@ import { Trans } from "@lingui/react/macro";
 import type { ReactNode } from "react";
 
 import type { LightProgram } from "../api/signals";
+import type { ApproachNames } from "../map/placeNames";
 import { DayPlans } from "./DayPlans";
 import { DetectorForms } from "./DetectorForms";
 import type { SignalEditing } from "./editing";
@@ -13,10 +14,12 @@ import { IntergreenMatrix } from "./IntergreenMatrix";
 export function ProgramParts({
   light,
   junction,
+  names,
   editing,
 }: {
   light: LightProgram;
   junction: string;
+  names: ApproachNames;
   editing: SignalEditing;
 }) {
   const own = light.origin === "scenario" && editing.timing ? editing.timing : null;
@@ -24,13 +27,13 @@ export function ProgramParts({
   return (
     <>
       <Fold title={<Trans>Change signal groups and stages</Trans>}>
-        {own ? <GroupForms {...parts} timing={own} /> : <Later />}
+        {own ? <GroupForms {...parts} names={names} timing={own} /> : <Later />}
       </Fold>
       <Fold title={<Trans>Change intergreens</Trans>}>
         {own ? <IntergreenMatrix {...parts} timing={own} /> : <Later />}
       </Fold>
       <Fold title={<Trans>Change detectors</Trans>}>
-        <DetectorForms {...parts} />
+        <DetectorForms {...parts} names={names} />
       </Fold>
       <Fold title={<Trans>Change the plans of the day</Trans>}>
         {own ? <DayPlans {...parts} timing={own} /> : <Later />}

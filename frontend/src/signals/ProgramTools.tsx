@@ -24,7 +24,9 @@ import {
 } from "../api/signals";
 import type { Edit } from "../api/types";
 import { Committed } from "../editor/Committed";
+import { byNameOrId, junctionChoices } from "../ui/choices";
 import { useAsked } from "../ui/useAsked";
+import type { ApproachNames, PlaceNames } from "../map/placeNames";
 import type { SignalEditing, TimingResult } from "./editing";
 import { served } from "../language/served";
 
@@ -34,6 +36,8 @@ interface Editable {
   editing: SignalEditing;
 }
 
+type Named = Editable & { names: ApproachNames };
+
 const TREATMENTS = localized(() => [
   { value: "permissive", label: t`Gaps` },
   { value: "both", label: t`Gaps and arrow` },
@@ -42,10 +46,10 @@ const TREATMENTS = localized(() => [
 const SAME = "same";
 
 /** Whose program runs, and how; the program of the map made one of the scenario. */
-export function ProgramControl({ light, junction, editing }: Editable) {
+export function ProgramControl({ light, junction, places, editing }: Editable & { places: PlaceNames }) {
   const { timing, control, edit } = editing;
   const own = light.origin === "scenario";
-  const all = control === "actuated" ? "actuated" : "fixed-time";
+  const all = control === "actuated" ? t`actuated` : t`fixed-time`;
   return (
     <>
       <Select
@@ -60,7 +64,10 @@ export function ProgramControl({ light, junction, editing }: Editable) {
         onChange={(value) => {
           const next = value === "fixed" || value === "actuated" ? value : null;
           if (value)
-            void edit({ kind: "set_timing", junction, control: next }, t`Control of light ${junction}`);
+            void edit(
+              { kind: "set_timing", junction, control: next },
+              t`Control of light ${places.junction(junction)}`,
+            );
         }}
       />
       <Group gap="xs">
@@ -83,8 +90,11 @@ export function ProgramControl({ light, junction, editing }: Editable) {
   );
 }
 
+const turnWords = (names: ApproachNames, { approach, turn }: CrossingTurn): string =>
+  names.movement(`${approach} ${turn}`);
+
 /** Turns across oncoming traffic: through gaps, with an arrow, or both. */
-export function TurnChoices({ light, junction, editing }: Editable) {
+export function TurnChoices({ light, junction, editing, names }: Named) {
   if (light.turns.length === 0) return null;
   const own = light.origin === "scenario";
   return (
@@ -99,11 +109,9 @@ export function TurnChoices({ light, junction, editing }: Editable) {
       )}
       {light.turns.map((turn) => (
         <div key={`${turn.approach} ${turn.turn}`} className="signal-turn">
-          <span>
-            {turn.approach} {turn.turn}
-          </span>
+          <span>{turnWords(names, turn)}</span>
           {turn.alone ? (
-            <Treatment light={light} turn={turn} junction={junction} editing={editing} />
+            <Treatment light={light} turn={turn} junction={junction} editing={editing} names={names} />
           ) : (
             <Text size="xs" c="dimmed">
               <Trans>permissive: shared lane</Trans>
@@ -115,7 +123,7 @@ export function TurnChoices({ light, junction, editing }: Editable) {
   );
 }
 
-function Treatment({ light, junction, editing, turn }: Editable & { turn: CrossingTurn }) {
+function Treatment({ light, junction, editing, names, turn }: Named & { turn: CrossingTurn }) {
   const { approach, turn: side } = turn;
   const [treatment, ask] = useAsked<string>(turn.treatment, light);
   const choose = (value: string): void => {
@@ -128,7 +136,7 @@ function Treatment({ light, junction, editing, turn }: Editable & { turn: Crossi
       data={TREATMENTS()}
       value={treatment}
       disabled={light.origin !== "scenario"}
-      aria-label={`${approach} ${side}`}
+      aria-label={turnWords(names, turn)}
       onChange={choose}
     />
   );
@@ -205,10 +213,12 @@ const DIRECTIONS = localized(() => [
 export function TimingTools({
   junction,
   junctions,
+  places,
   editing,
 }: {
   junction: string;
   junctions: readonly string[];
+  places: PlaceNames;
   editing: SignalEditing;
 }) {
   const { name, time } = editing;
@@ -255,6 +265,7 @@ export function TimingTools({
       {junctions.length > 1 && (
         <Corridor
           junctions={junctions}
+          places={places}
           busy={busy}
           onWish={(wish) => void ask((version) => signals.corridor(name, version, wish))}
         />
@@ -303,10 +314,12 @@ export function TimingTools({
 /** A green wave: lights in driving order, and the direction whose band is to be the widest. */
 function Corridor({
   junctions,
+  places,
   busy,
   onWish,
 }: {
   junctions: readonly string[];
+  places: PlaceNames;
   busy: boolean;
   onWish: (wish: CorridorWish) => void;
 }) {
@@ -320,7 +333,8 @@ function Corridor({
       <div className="signal-corridor">
         <MultiSelect
           label={t`Junctions in driving order`}
-          data={[...junctions]}
+          data={junctionChoices(places, junctions)}
+          filter={byNameOrId}
           value={chosen}
           onChange={setChosen}
           searchable

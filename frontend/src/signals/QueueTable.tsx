@@ -2,10 +2,11 @@ import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 
 import { lengthText } from "../language/units";
+import type { ApproachNames } from "../map/placeNames";
 import type { Queue } from "./queues";
 
 /** Who waits now, by approach. */
-export function QueueTable({ queues }: { queues: readonly Queue[] }) {
+export function QueueTable({ queues, names }: { queues: readonly Queue[]; names: ApproachNames }) {
   return (
     <table className="signal-table" aria-label={t`Queues now`}>
       <thead>
@@ -24,7 +25,7 @@ export function QueueTable({ queues }: { queues: readonly Queue[] }) {
       <tbody>
         {queues.map(({ approach, vehicles, metres }) => (
           <tr key={approach}>
-            <th scope="row">{approach}</th>
+            <th scope="row">{names.approach(approach)}</th>
             <td>{vehicles}</td>
             <td>{vehicles > 0 ? lengthText(metres) : "–"}</td>
           </tr>

@@ -5,6 +5,7 @@ import { useEffect, useRef } from "react";
 
 import type { Detector, LightProgram } from "../api/signals";
 import { lengthText } from "../language/units";
+import type { ApproachNames } from "../map/placeNames";
 import type { Sight } from "./occupancy";
 
 /** What the server has drawn: names in it are escaped there. */
@@ -99,7 +100,7 @@ function purposeOf({ call, bus, stages }: Detector): string {
   return bus ? t`priority in stage ${named}` : t`prolongs stage ${named}`;
 }
 
-export function GroupTable({ light }: { light: LightProgram }) {
+export function GroupTable({ light, names }: { light: LightProgram; names: ApproachNames }) {
   return (
     <details>
       <summary>
@@ -120,7 +121,7 @@ export function GroupTable({ light }: { light: LightProgram }) {
           {light.groups.map(({ id, movements }) => (
             <tr key={id}>
               <th scope="row">{id}</th>
-              <td>{movements.join(", ")}</td>
+              <td>{names.movements(movements)}</td>
             </tr>
           ))}
         </tbody>

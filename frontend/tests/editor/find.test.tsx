@@ -6,6 +6,7 @@ import { commandsOf } from "../../src/editor/commands";
 import { findAll } from "../../src/editor/find";
 import { FindDialog } from "../../src/editor/FindDialog";
 import { Graph } from "../../src/map/graph";
+import { PlaceNames } from "../../src/map/placeNames";
 import { actor, columns, flow, graph } from "../example";
 import { show } from "../page";
 
@@ -29,15 +30,32 @@ test("roads, junctions and road users are found by id and by kind, the exact one
   expect(names("  ")).toEqual([]);
 });
 
+test("roads and junctions are found by the names of their streets, which are listed", async () => {
+  const names = new PlaceNames({
+    junctions: [{ id: "j21", streets: ["East Street", "North Street"], which: "", legs: [] }],
+    roads: [{ id: "r12", street: "North Street", ends: [], side: "" }],
+  });
+  const streets = new Graph(town.columns, names);
+  expect(findAll(streets, ones, "north street").map(({ id, name }) => [id, name])).toEqual([
+    ["r12", "North Street"],
+    ["j21", "East Street / North Street"],
+  ]);
+  const { user } = show(
+    <FindDialog graph={streets} ones={[]} commands={[]} onGo={vi.fn()} onClose={vi.fn()} />,
+  );
+  await user.type(await screen.findByRole("combobox", { name: /^Name of a place/ }), "east");
+  expect(screen.getByRole("option").textContent).toBe("East Street / North StreetJunction j21");
+});
+
 test("what is found is chosen with arrow keys and Enter, or by a click", async () => {
   const [onGo, onClose] = [vi.fn(), vi.fn()];
   const { user } = show(<FindDialog graph={town} ones={ones} commands={[]} onGo={onGo} onClose={onClose} />);
   const field = await screen.findByRole("combobox", { name: /^Name of a place/ });
   await user.type(field, "1{ArrowDown}{ArrowDown}{ArrowUp}{Enter}");
-  expect(onGo).toHaveBeenCalledWith({ is: "segment", id: "j1", kind: "Junction" });
+  expect(onGo).toHaveBeenCalledWith({ is: "segment", id: "j1", name: "Junction 1", kind: "Junction" });
   expect(onClose).toHaveBeenCalledOnce();
   await user.click(screen.getByRole("option", { name: /car-1/ }));
-  expect(onGo).toHaveBeenLastCalledWith({ is: "one", id: "car-1", kind: "Car" });
+  expect(onGo).toHaveBeenLastCalledWith({ is: "one", id: "car-1", name: "car-1", kind: "Car" });
 });
 
 test("what is chosen closes the search, and keys act on the map again", async () => {

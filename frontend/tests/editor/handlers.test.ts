@@ -155,7 +155,7 @@ test("a click on a signal inside the region shows its program and takes nothing 
   const lights = lightAt(x, y);
   const { log, handler } = using(null, scenario([], ["a"]), { lights }, "region");
   expect(handler.hint(handler.under(at(x, y)))).toBe(
-    "Traffic light of junction 10: click to see its program",
+    "Traffic light at Junction 10: click to see its program",
   );
   handler.pick(at(x, y));
   expect([log.edits, log.lights, log.steps]).toEqual([[], ["10"], ["lights"]]);
@@ -572,7 +572,7 @@ test("a click on a traffic light shows its program, unless something is placed o
   const free = editing(scenario([]), log, { lights });
   const handler = handlerFor("traffic", null, free);
   expect(handler.hint(handler.under(at(x, y)))).toBe(
-    "Traffic light of junction 10: click to see its program",
+    "Traffic light at Junction 10: click to see its program",
   );
   handler.pick(at(x, y));
   expect(log.lights).toEqual(["10"]);

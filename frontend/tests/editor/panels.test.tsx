@@ -21,6 +21,7 @@ import { createEditorStore } from "../../src/editor/store";
 import { TableForm } from "../../src/editor/TableForm";
 import { Tour } from "../../src/editor/Tour";
 import { Picker } from "../../src/map/picking";
+import { NO_NAMES } from "../../src/map/placeNames";
 import { actor, assets, flow, graph, problem, scenario } from "../example";
 import { choose, fill, rowsOf, server, show } from "../page";
 
@@ -389,6 +390,7 @@ function toRun(document: ScenarioDocument, more: Partial<RunProps> = {}) {
       name="s"
       version={1}
       document={document}
+      places={NO_NAMES}
       blocked={false}
       empty={false}
       busy={false}
@@ -480,7 +482,14 @@ test("a run begins in real time with its trajectories, unless another choice is 
 test("lights are chosen by their junction, fixed-time or actuated; a map without them says so", async () => {
   const [onEdit, onShow] = [vi.fn(), vi.fn()];
   const step = (junctions: readonly string[]) => (
-    <LightsStep junctions={junctions} shown="7" control="fixed" onEdit={onEdit} onShow={onShow} />
+    <LightsStep
+      junctions={junctions}
+      places={NO_NAMES}
+      shown="7"
+      control="fixed"
+      onEdit={onEdit}
+      onShow={onShow}
+    />
   );
   const { user, again } = show(step(["5", "7"]));
   expect(screen.getByRole("button", { name: "Junction 7" }).getAttribute("aria-pressed")).toBe("true");
@@ -518,6 +527,7 @@ test("an empty scenario, or one with errors, cannot be run and says why", () => 
       name="s"
       version={1}
       document={scenario([])}
+      places={NO_NAMES}
       blocked
       empty={false}
       busy={false}

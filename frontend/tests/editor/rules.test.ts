@@ -75,7 +75,7 @@ test("combinations, edges and actions at the same time are said in the sentence"
   );
   expect(sentence(draftOf(nested))).toBe(
     "When not (time is 4 s or more) and (time is 4 s or more or time is 4 s or more (2 s later)), " +
-      "brake at 6 m/s² to a standstill and at the same time sound the horn, then switch light 9 off.",
+      "brake at 6 m/s² to a standstill and at the same time sound the horn, then switch the light at Junction 9 off.",
   );
   expect(sentence(draftOf(sent({ ...time, edge: "rising" }, [brake])))).toMatch(
     /^When it becomes true that time is 4 s or more, /,

@@ -14,6 +14,7 @@ import { Legend } from "../../src/run/Legend";
 import { Interrupted, SafeSlices } from "../../src/run/LongRun";
 import { Result } from "../../src/run/Result";
 import { LiveStrip } from "../../src/run/Strip";
+import { NO_NAMES } from "../../src/map/placeNames";
 import { FIGURES } from "../figures";
 import { summary } from "../messages";
 import { rowsOf, server, show } from "../page";
@@ -280,7 +281,7 @@ test("counts that are not met are listed worst first with their count station", 
     },
   });
   const [onFit, onShow] = [vi.fn(), vi.fn()];
-  const { user } = show(<CountsFit run="r1" onFit={onFit} onShow={onShow} />);
+  const { user } = show(<CountsFit run="r1" places={NO_NAMES} onFit={onFit} onShow={onShow} />);
   expect(await screen.findByRole("heading", { name: "1 of 3 counts met (33 %)" })).toBeTruthy();
   expect(rowsOf(screen.getByRole("table", { name: "Counts that are not met" }))).toEqual([
     ["r3 > j40–15 min", "100", "40", "9.0"],

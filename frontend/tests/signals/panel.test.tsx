@@ -6,6 +6,7 @@ import type { LightProgram } from "../../src/api/signals";
 import type { SignalNow } from "../../src/signals/cursor";
 import { occupancy } from "../../src/signals/occupancy";
 import { SignalPanel } from "../../src/signals/SignalPanel";
+import { NO_NAMES } from "../../src/map/placeNames";
 import { rowsOf, show } from "../page";
 import { detector, plan, program } from "./program";
 
@@ -17,7 +18,16 @@ interface More {
 
 const panel = (light: LightProgram, more: More = {}) => {
   const load = () => Promise.resolve(light);
-  return <SignalPanel junctions={["10"]} junction="10" onJunction={vi.fn()} load={load} {...more} />;
+  return (
+    <SignalPanel
+      junctions={["10"]}
+      junction="10"
+      places={NO_NAMES}
+      onJunction={vi.fn()}
+      load={load}
+      {...more}
+    />
+  );
 };
 
 test("a program says whose it is, and its cycle, offset and splits", async () => {
@@ -37,7 +47,14 @@ test("in a run the stage that is shown is marked, in words and for screen reader
   const now: SignalNow = { time: 107, state: "gr", since: 100, before: "rr", plan: "day" };
   const load = vi.fn(() => Promise.resolve(program()));
   const part = (at: SignalNow) => (
-    <SignalPanel junctions={["10"]} junction="10" onJunction={vi.fn()} load={load} now={at} />
+    <SignalPanel
+      junctions={["10"]}
+      junction="10"
+      places={NO_NAMES}
+      onJunction={vi.fn()}
+      load={load}
+      now={at}
+    />
   );
   const { again } = show(part(now));
   const stage = (await screen.findByText("stage 1: 15 s")).closest("li");
@@ -99,6 +116,7 @@ test("in a run that is watched detectors are occupied or free, in the table and 
     <SignalPanel
       junctions={["10"]}
       junction="10"
+      places={NO_NAMES}
       onJunction={vi.fn()}
       load={load}
       now={now}
@@ -132,9 +150,16 @@ test("what the server refuses is said, and Escape closes", async () => {
   const onClose = vi.fn();
   const load = () => Promise.reject(new Error("intergreen of 3 s is too short"));
   const { user } = show(
-    <SignalPanel junctions={["10"]} junction="10" onJunction={vi.fn()} load={load} onClose={onClose} />,
+    <SignalPanel
+      junctions={["10"]}
+      junction="10"
+      places={NO_NAMES}
+      onJunction={vi.fn()}
+      load={load}
+      onClose={onClose}
+    />,
   );
-  const region = screen.getByRole("region", { name: "Traffic light of junction 10" });
+  const region = screen.getByRole("region", { name: "Traffic light at Junction 10" });
   expect(await within(region).findByText("intergreen of 3 s is too short")).toBeTruthy();
   expect(document.activeElement).toBe(region);
   await user.keyboard("{Escape}");
@@ -145,13 +170,20 @@ test("Escape in the list of junctions closes that list, and the next one the pan
   const onClose = vi.fn();
   const load = () => Promise.reject(new Error("no program"));
   const { user } = show(
-    <SignalPanel junctions={["10", "12"]} junction="10" onJunction={vi.fn()} load={load} onClose={onClose} />,
+    <SignalPanel
+      junctions={["10", "12"]}
+      junction="10"
+      places={NO_NAMES}
+      onJunction={vi.fn()}
+      load={load}
+      onClose={onClose}
+    />,
   );
   await screen.findByText("no program");
-  await user.click(screen.getByRole("textbox", { name: "Traffic light of junction" }));
-  expect(screen.getByRole("option", { name: "12" })).toBeTruthy();
+  await user.click(screen.getByRole("textbox", { name: "Junction" }));
+  expect(screen.getByRole("option", { name: "Junction 12" })).toBeTruthy();
   await user.keyboard("{Escape}");
-  expect(screen.queryByRole("option", { name: "12" })).toBeNull();
+  expect(screen.queryByRole("option", { name: "Junction 12" })).toBeNull();
   expect(onClose).not.toHaveBeenCalled();
   await user.keyboard("{Escape}");
   expect(onClose).toHaveBeenCalledTimes(1);

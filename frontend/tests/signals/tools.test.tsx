@@ -12,6 +12,7 @@ import { QueueTable } from "../../src/signals/QueueTable";
 import { SignalPanel } from "../../src/signals/SignalPanel";
 import { Graph } from "../../src/map/graph";
 import type { GraphColumns, MapDetails } from "../../src/api/types";
+import { ApproachNames, NO_NAMES } from "../../src/map/placeNames";
 import { rowsOf, show } from "../page";
 import { detector, program } from "./program";
 
@@ -52,10 +53,22 @@ const editable = (more: Partial<SignalEditing> = {}): SignalEditing => ({
   ...more,
 });
 
-const panel = (light: LightProgram, editing: SignalEditing, junctions: readonly string[] = ["10"]) => {
+const panel = (
+  light: LightProgram,
+  editing: SignalEditing,
+  junctions: readonly string[] = ["10"],
+  places = NO_NAMES,
+) => {
   const load = () => Promise.resolve(light);
   return (
-    <SignalPanel junctions={junctions} junction="10" onJunction={vi.fn()} load={load} editing={editing} />
+    <SignalPanel
+      junctions={junctions}
+      junction="10"
+      places={places}
+      onJunction={vi.fn()}
+      load={load}
+      editing={editing}
+    />
   );
 };
 const turn = { approach: "r1", turn: "left", treatment: "permissive", alone: true } as const;
@@ -220,7 +233,7 @@ test("queues are a table, and none has no end", () => {
     { approach: "r1", vehicles: 3, metres: 21.4 },
     { approach: "r2", vehicles: 0, metres: 0 },
   ];
-  show(<QueueTable queues={queues} />);
+  show(<QueueTable queues={queues} names={new ApproachNames(NO_NAMES, null)} />);
   expect(rowsOf(screen.getByRole("table", { name: "Queues now" }))).toEqual([
     ["r1", "3", "21 m"],
     ["r2", "0", "–"],

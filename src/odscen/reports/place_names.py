@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -41,6 +41,56 @@ def compass_point(direction: float) -> str:
     return COMPASS[round(direction / (math.pi / 4.0)) % 8]
 
 
+class JunctionName(NamedTuple):
+    """What the name of a junction is made of.
+
+    Attributes
+    ----------
+    streets
+        At most two that meet; none if the map names none.
+    which
+        Point of the compass, or the id, where several junctions would have one name; else empty.
+    """
+
+    streets: tuple[str, ...]
+    which: str = ""
+
+    def to_words(self, junction: str) -> str:
+        """``"East Street 5 / North Street 3 (north)"``, or ``"Junction 10"``."""
+        name = " / ".join(self.streets) or _name_of_id(junction)
+        return f"{name} ({self.which})" if self.which else name
+
+
+class RoadName(NamedTuple):
+    """What the name of a road segment is made of.
+
+    Attributes
+    ----------
+    street
+        Empty if the map names none.
+    ends
+        Junctions at its ends, with the street that crosses there; that is empty where the junction
+        is to be named itself.
+    side
+        Point of the compass in which it lies from the junction, if it has one only.
+    """
+
+    street: str
+    ends: tuple[tuple[str, str], ...]
+    side: str
+
+    def to_words(self, segment: str, junctions: Mapping[str, str]) -> str:
+        """``"North Street 3 between East Street 2 and East Street 3"``."""
+        road = self.street or f"Road {segment.removeprefix('r')}"
+        crossed = sorted({street or junctions.get(end, end) for end, street in self.ends})
+        if len(crossed) == 2:
+            return f"{road} between {crossed[0]} and {crossed[1]}"
+        if len(crossed) == 1:
+            side = self.side
+            return f"{road}, {side} of {crossed[0]}" if side else f"{road} at {crossed[0]}"
+        return road
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaceNames:
     """Names of segments, junctions, turning movements and spots of a map; ids where it has none.
@@ -56,12 +106,16 @@ class PlaceNames:
         road segments lies.
     middles
         Middle of each junction, shape ``(2,)``, metres, OpenDRIVE frame.
+    junction_names, road_names
+        What the names are made of, for those who say them in another language.
     """
 
     junctions: Mapping[str, str] = field(default_factory=dict)
     segments: Mapping[str, str] = field(default_factory=dict)
     legs: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     middles: Mapping[str, FloatArray] = field(default_factory=dict)
+    junction_names: Mapping[str, JunctionName] = field(default_factory=dict)
+    road_names: Mapping[str, RoadName] = field(default_factory=dict)
 
     def name_junction(self, junction: str) -> str:
         """``"East Street 5 / North Street 3"``, or ``"Junction 10"``."""
@@ -226,13 +280,20 @@ def place_names(graph: MapGraph, road_names: Mapping[str, str]) -> PlaceNames:
         for row in range(len(ids))
         if ids[row] in middles
     }
-    junctions = _name_junctions(legs, streets, middles)
-    named = {}
-    for row, name in enumerate(ids):
-        if not is_junction[row]:
-            ends = [ids[other] for other in neighbours[row] if is_junction[other]]
-            named[name] = _name_between(name, ends, streets, legs, junctions)
-    return PlaceNames(junctions, named, legs, middles)
+    meeting = _name_junctions(legs, streets, middles)
+    roads = {
+        name: _name_road(
+            name,
+            [ids[other] for other in neighbours[row] if is_junction[other]],
+            streets,
+            legs,
+        )
+        for row, name in enumerate(ids)
+        if not is_junction[row]
+    }
+    junctions = {name: parts.to_words(name) for name, parts in meeting.items()}
+    named = {name: parts.to_words(name, junctions) for name, parts in roads.items()}
+    return PlaceNames(junctions, named, legs, middles, meeting, roads)
 
 
 def _street_of(names: Sequence[str], lengths: Sequence[float]) -> str:
@@ -255,20 +316,21 @@ def _name_junctions(
     legs: Mapping[str, Mapping[str, float]],
     streets: Mapping[str, str],
     middles: Mapping[str, FloatArray],
-) -> dict[str, str]:
+) -> dict[str, JunctionName]:
     """Two streets that meet; with a side where several junctions would have one name."""
     names = {}
     for junction, around in legs.items():
         count = Counter(streets[leg] for leg in around if streets.get(leg))
         met = sorted(sorted(count), key=lambda street: -count[street])[:2]
-        names[junction] = " / ".join(sorted(met)) if met else _name_of_id(junction)
-    alike: dict[str, list[str]] = defaultdict(list)
+        names[junction] = JunctionName(tuple(sorted(met)))
+    alike: dict[tuple[str, ...], list[str]] = defaultdict(list)
     for junction, name in names.items():
-        alike[name].append(junction)
-    for name, group in alike.items():
+        if name.streets:
+            alike[name.streets].append(junction)
+    for together, group in alike.items():
         if len(group) > 1:
             for junction, which in _tell_apart(group, middles).items():
-                names[junction] = f"{name} ({which})"
+                names[junction] = JunctionName(together, which)
     return names
 
 
@@ -284,26 +346,19 @@ def _tell_apart(group: Sequence[str], middles: Mapping[str, FloatArray]) -> dict
     return {junction: junction.removeprefix("j") for junction in group}
 
 
-def _name_between(
+def _name_road(
     segment: str,
     ends: Sequence[str],
     streets: Mapping[str, str],
     legs: Mapping[str, Mapping[str, float]],
-    junctions: Mapping[str, str],
-) -> str:
+) -> RoadName:
     """Street, and the streets or junctions at its ends."""
     own = streets.get(segment, "")
     crossed = []
     for end in ends:
         others = {streets[leg] for leg in legs.get(end, {}) if streets.get(leg)} - {own}
         # Of a street between two squares both ends would have its own name.
-        name = junctions.get(end, end)
-        crossed.append(min(others) if own and len(others) == 1 else name)
-    road = own or f"Road {segment.removeprefix('r')}"
-    crossed = sorted(set(crossed))
-    if len(crossed) == 2:
-        return f"{road} between {crossed[0]} and {crossed[1]}"
-    if len(crossed) == 1 and ends:
-        side = compass_point(legs[ends[0]][segment]) if segment in legs.get(ends[0], {}) else ""
-        return f"{road}, {side} of {crossed[0]}" if side else f"{road} at {crossed[0]}"
-    return road
+        crossed.append((end, min(others) if own and len(others) == 1 else ""))
+    around = legs.get(ends[0], {}) if ends else {}
+    side = compass_point(around[segment]) if segment in around else ""
+    return RoadName(own, tuple(crossed), side)

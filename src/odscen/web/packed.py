@@ -11,8 +11,10 @@ import numpy as np
 import orjson
 from starlette.responses import Response
 
+from odscen.app.map_names import map_names
 from odscen.app.maps import load_map
 from odscen.lanegraph.node_heights import node_heights
+from odscen.reports.place_names import compass_point
 from odscen.web.wire.media_types import Responses
 
 if TYPE_CHECKING:
@@ -120,6 +122,34 @@ def packed_heights(entry: MapEntry) -> PackedAnswer:
     lanes, walks = node_heights(load_map(entry).sumo.graph)
     columns = {"z": np.round(lanes, 3), "walks": np.round(walks, 3)}
     return pack(orjson.dumps(columns, option=orjson.OPT_SERIALIZE_NUMPY))
+
+
+@lru_cache(maxsize=8)
+def packed_names(entry: MapEntry) -> PackedAnswer:
+    """What the names of a map's junctions and roads are made of."""
+    names = map_names(load_map(entry))
+    junctions = [
+        {
+            "id": junction,
+            "streets": name.streets,
+            "which": name.which,
+            "legs": [
+                {"segment": segment, "side": compass_point(direction)}
+                for segment, direction in names.legs[junction].items()
+            ],
+        }
+        for junction, name in names.junction_names.items()
+    ]
+    roads = [
+        {
+            "id": segment,
+            "street": name.street,
+            "ends": [{"junction": junction, "street": street} for junction, street in name.ends],
+            "side": name.side,
+        }
+        for segment, name in names.road_names.items()
+    ]
+    return pack(orjson.dumps({"junctions": junctions, "roads": roads}))
 
 
 def _pack_places(*columns: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:

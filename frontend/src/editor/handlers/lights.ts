@@ -1,6 +1,7 @@
 import { t } from "@lingui/core/macro";
 
 import type { Pointed } from "../../map/MapCanvas";
+import type { PlaceNames } from "../../map/placeNames";
 import { type Editing, type Handler, type Hover, LOOKING } from "./handler";
 import { goalAt, oneAt } from "./select";
 
@@ -13,7 +14,7 @@ export function withLights(handler: Handler, editing: Editing): Handler {
       const junction = lights?.junctionAt(at) ?? null;
       return lightHover(junction) ?? handler.under(at);
     },
-    hint: (hover) => (hover?.is === "light" ? lightWords(hover) : handler.hint(hover)),
+    hint: (hover) => (hover?.is === "light" ? lightWords(hover, editing.graph.names) : handler.hint(hover)),
     pick: (at) => {
       // Road users and goals that lie on a stop line come first.
       const junction = oneAt(editing, at) || goalAt(editing, at) ? null : lights?.junctionAt(at);
@@ -27,7 +28,8 @@ export function withLights(handler: Handler, editing: Editing): Handler {
 const REACH = 40;
 
 /** Where only lights are chosen: a click anywhere on a junction shows its program. */
-export const lightsHandler = ({ lights, showLight }: Editing): Handler => {
+export const lightsHandler = (editing: Editing): Handler => {
+  const { lights, showLight } = editing;
   const there = (at: Pointed): string | null =>
     lights?.junctionAt({ ...at, reach: Math.max(at.reach, REACH) }) ?? null;
   return {
@@ -36,7 +38,7 @@ export const lightsHandler = ({ lights, showLight }: Editing): Handler => {
     under: (at) => lightHover(there(at)),
     hint: (hover) =>
       hover?.is === "light"
-        ? lightWords(hover)
+        ? lightWords(hover, editing.graph.names)
         : lights && lights.junctions.length > 0
           ? t`Click a junction with a traffic light to see its program`
           : null,
@@ -50,5 +52,5 @@ export const lightsHandler = ({ lights, showLight }: Editing): Handler => {
 export const lightHover = (junction: string | null): Hover | null =>
   junction === null ? null : { is: "light", junction };
 
-export const lightWords = ({ junction }: Extract<Hover, { is: "light" }>): string =>
-  t`Traffic light of junction ${junction}: click to see its program`;
+export const lightWords = ({ junction }: Extract<Hover, { is: "light" }>, names: PlaceNames): string =>
+  t`Traffic light at ${names.junction(junction)}: click to see its program`;

@@ -123,13 +123,13 @@ function laneAt({ graph, picker, roi }: Editing, at: Pointed, by: PickBy): Place
 
 function said({ graph, pick }: Editing, by: PickBy, hover: Hover | null): string {
   if (hover?.is === "loop") return loopWords(hover);
-  if (hover?.is === "light") return t`Traffic light of junction ${hover.junction}`;
+  if (hover?.is === "light") return t`Traffic light at ${graph.names.junction(hover.junction)}`;
   if (hover?.is === "place") return laneWord(graph, hover.place.id);
   const from = pick.now?.from;
   if (hover?.is === "segment") {
     const segment = graph.segmentId(hover.row);
-    if (by === "segment" || !from) return segment;
-    if (segment !== from) return t`From ${from} into ${segment}`;
+    if (by === "segment" || !from) return graph.names.placeWithId(segment);
+    if (segment !== from) return graph.names.place(`${from}>${segment}`);
   }
-  return from ? t`From ${from}: click the road that the turn leads into.` : PROMPT()[by];
+  return from ? t`From ${graph.names.road(from)}: click the road that the turn leads into.` : PROMPT()[by];
 }

@@ -20,7 +20,7 @@ export function regionHandler(editing: Editing): Handler {
     aim: true,
     under: (at) => lightHover(lightAt(at)) ?? segmentHover(picker, at),
     hint: (hover) => {
-      if (hover?.is === "light") return lightWords(hover);
+      if (hover?.is === "light") return lightWords(hover, graph.names);
       const segment = hover?.is === "segment" ? graph.segmentId(hover.row) : null;
       if (segment !== null && region.inside.includes(segment))
         return region.removable.includes(segment)

@@ -7,8 +7,10 @@ import {
   given,
   type Kind,
   light,
+  lightText,
   maybe,
   movement,
+  movementText,
   number,
   OVER,
   OWN,
@@ -255,9 +257,9 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
       { ...movement(), without: (values) => values.shows === "off" || values.shows === "program" },
     ],
     words: (v) => {
-      if (v.shows === "off") return t`switch light ${text(v.light)} off`;
-      if (v.shows === "program") return t`let light ${text(v.light)} run its program again`;
-      return t`switch light ${text(v.light)} to green for ${text(v.movement)}`;
+      if (v.shows === "off") return t`switch the light at ${lightText(v.light)} off`;
+      if (v.shows === "program") return t`let the light at ${lightText(v.light)} run its program again`;
+      return t`switch the light at ${lightText(v.light)} to green (${movementText(v.light, v.movement)})`;
     },
   },
   lights: {

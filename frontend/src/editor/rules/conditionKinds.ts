@@ -10,8 +10,10 @@ import {
   given,
   type Kind,
   light,
+  lightText,
   limit,
   movement,
+  movementText,
   number,
   OF,
   OWN,
@@ -122,7 +124,8 @@ export const CONDITION_KINDS = localized((): Record<ConditionKind, Kind> => ({
         choices: { red: t`Red`, yellow: t`Yellow`, green: t`Green` },
       },
     ],
-    words: (v) => t`light ${text(v.light)} shows ${text(v.shows)} for ${text(v.movement)}`,
+    words: (v) =>
+      t`the light at ${lightText(v.light)} shows ${text(v.shows)} (${movementText(v.light, v.movement)})`,
   },
   rule: {
     label: t`Another rule`,

@@ -1,6 +1,7 @@
 import { t } from "@lingui/core/macro";
 
 import { shownAs } from "../../language/units";
+import { ApproachNames, NO_NAMES } from "../../map/placeNames";
 import { short } from "../../language/numbers";
 import { localized } from "../../language/localized";
 import type { PickBy } from "../pick";
@@ -148,10 +149,22 @@ export const bound = (suffix: string, start: number, scale = 1, min = 0): Field 
 export const given = (value: unknown): boolean => value !== undefined && value !== null;
 
 let placeName = (node: string): string => node;
-/** Say in sentences where nodes are; before a map is there they are called by their ids. */
-export const namePlaces = (by: (node: string) => string): void => {
+let mapNames = NO_NAMES;
+/** Say in sentences where nodes and lights are; before a map is there they are called by their ids. */
+export const namePlaces = (by: (node: string) => string, names = NO_NAMES): void => {
   placeName = by;
+  mapNames = names;
 };
+
+/** The junction of a traffic light in words. */
+export const lightText = (light: unknown): string =>
+  typeof light === "string" && light ? mapNames.junction(light) : "…";
+
+/** A movement at a traffic light: `from the west, left turn`. */
+export const movementText = (light: unknown, movement: unknown): string =>
+  typeof light === "string" && typeof movement === "string" && movement
+    ? new ApproachNames(mapNames, { junctions: [light], lanes: [] }).movement(movement)
+    : "…";
 
 const metres = (value: unknown): string => (typeof value === "number" ? short(value, 1) : "?");
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import logging
 from contextlib import nullcontext
-from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import polars as pl
 
+from odscen.app.map_names import map_names
 from odscen.app.maps import load_map
 from odscen.app.scenarios import read_scenario
 from odscen.base.errors import InputError, NotFoundError, in_file
@@ -24,14 +24,13 @@ from odscen.figures.measures.registry import figure_values
 from odscen.figures.measures.signal_use import SIGNALS_TABLE, read_signal_use_table
 from odscen.figures.measures.summary import actors_from_json
 from odscen.figures.measures.traffic_files import read_stations, read_tables
-from odscen.opendrive.road_names import road_names
 from odscen.records.assignment_steps import Assignment
 from odscen.records.light_programs import programs_from_json
 from odscen.records.outcomes import RunStatus
 from odscen.records.row_text import rounded
 from odscen.records.run_events import events_from_json
 from odscen.records.run_plan import Plan
-from odscen.reports.place_names import NO_NAMES, place_names
+from odscen.reports.place_names import NO_NAMES
 from odscen.reports.replay import Scenery, replay_values
 from odscen.reports.report_maps import place_shapes
 from odscen.reports.report_sections import FEW
@@ -65,7 +64,6 @@ if TYPE_CHECKING:
     from odscen.figures.measures.figure import RunData
     from odscen.formats.base import RecordedRun
     from odscen.maps.store import Workspace
-    from odscen.reports.place_names import PlaceNames
 
 SCENERY_SCRIPT = "web/static/replay/scenery.js"
 """Of the built page, below the package: draws a replay in three dimensions."""
@@ -212,7 +210,7 @@ def _render_page(
         every=recorded.every if recorded is not None else 1,
         figures=figures,
         shapes=None if sumo_map is None else place_shapes(sumo_map.graph),
-        names=NO_NAMES if loaded is None else _map_names(loaded),
+        names=NO_NAMES if loaded is None else map_names(loaded),
         corridor=followed,
         conflicts=read_conflicts(folder),
         lights=_read_lights(folder),
@@ -223,14 +221,6 @@ def _render_page(
         motion=motion,
         replay=replay,
     )
-
-
-@lru_cache(maxsize=4)
-def _map_names(loaded: LoadedMap) -> PlaceNames:
-    entry = loaded.entry
-    # A map that was removed under the run has left what the run needs, but no names.
-    names = road_names(entry.read("xodr")) if entry.path("xodr").exists() else {}
-    return place_names(loaded.sumo.graph, names)
 
 
 def _read_parking_use(folder: Path, summary: Mapping[str, Any]) -> ParkingUse | None:

@@ -38,7 +38,14 @@ from odscen.web.messages import (
     OptionInfo,
     WeatherInfo,
 )
-from odscen.web.packed import UNCHANGED, answer, packed_drawing, packed_graph, packed_heights
+from odscen.web.packed import (
+    UNCHANGED,
+    answer,
+    packed_drawing,
+    packed_graph,
+    packed_heights,
+    packed_names,
+)
 from odscen.web.services import Shared
 from odscen.web.wire.map_messages import (
     BrokenMapInfo,
@@ -57,6 +64,7 @@ from odscen.web.wire.map_messages import (
     MapEditsInfo,
     MapHeader,
     MapInfo,
+    MapNames,
     NetCounts,
     NetworkOrigin,
     PlaceInfo,
@@ -132,6 +140,12 @@ def graph(name: str, request: Request, shared: Shared) -> Response:
 def heights(name: str, request: Request, shared: Shared) -> Response:
     """Heights of the nodes of a map's graphs; none where all have the same."""
     return answer(request, packed_heights(shared.workspace.map(name)))
+
+
+@router.get("/maps/{name}/names", response_model=MapNames, responses=UNCHANGED)
+def names(name: str, request: Request, shared: Shared) -> Response:
+    """Names of the map's junctions and roads by streets and the compass, in parts."""
+    return answer(request, packed_names(shared.workspace.map(name)))
 
 
 @router.get("/maps/{name}/report")

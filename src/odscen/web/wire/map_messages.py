@@ -174,6 +174,56 @@ class MapDetails(MapInfo):
     lights: list[LightInfo]
 
 
+Side = Literal[
+    "east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east"
+]
+
+
+class LegInfo(Answer):
+    """A road segment at a junction, and the side of the junction on which it lies."""
+
+    segment: str
+    side: Side
+
+
+class JunctionNameInfo(Answer):
+    """What the name of a junction is made of: at most two streets that meet, none if nameless.
+
+    ``which`` is a side, or the id, where several junctions meet the same streets; else empty.
+    """
+
+    id: str
+    streets: list[str]
+    which: str
+    legs: list[LegInfo]
+
+
+class RoadEndInfo(Answer):
+    """A junction at the end of a road, and the one street that crosses there; else empty."""
+
+    junction: str
+    street: str
+
+
+class RoadNameInfo(Answer):
+    """What the name of a road segment is made of; ``street`` is empty if it has none.
+
+    ``side`` is that of the first junction on which it lies; empty without a junction.
+    """
+
+    id: str
+    street: str
+    ends: list[RoadEndInfo]
+    side: Side | Literal[""]
+
+
+class MapNames(Answer):
+    """Names of the junctions and roads of a map, in parts, to be said in any language."""
+
+    junctions: list[JunctionNameInfo]
+    roads: list[RoadNameInfo]
+
+
 class PlaceInfo(Answer):
     """What is at a place of a map: its lane, and what is near it.
 
