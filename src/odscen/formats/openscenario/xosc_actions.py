@@ -23,6 +23,7 @@ from odscen.formats.openscenario.xosc_signals import (
     signals_of,
 )
 from odscen.formats.openscenario.xosc_triggers import CannotSayError
+from odscen.scenario.document.rules_document import USUAL_MOVE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -35,7 +36,12 @@ if TYPE_CHECKING:
     from odscen.scenario.document.rules_document import StoryRule
     from odscen.scenario.document.scenario_document import Actor
 
-_SHAPES: Final = {"step": "step", "linear": "linear", "cosine": "sinusoidal"}
+_SHAPES: Final = {
+    "step": "step",
+    "linear": "linear",
+    "cosine": "sinusoidal",
+    "cubic": "cubic",
+}
 _RATE: Final = "ScenarioRunner takes the rate as seconds"
 _WALKING: Final = 1.4
 """m/s of pedestrians whose speed is not given."""
@@ -132,12 +138,14 @@ def _write_drive(made: Actions, part: Any, _actor: str, _where: str) -> list[_El
     return [_controller_action(made, lateral=by_sumo, longitudinal=by_sumo)]
 
 
-def _lane_change(over: float, target: _Element, offset: float | None = None) -> _Element:
+def _lane_change(part: Any, target: _Element, offset: float | None = None) -> _Element:
+    given = (("rate", part.rate), ("distance", part.within), ("time", part.over or USUAL_MOVE))
+    dimension, value = next(pair for pair in given if pair[1] is not None)
     dynamics = xml(
         "LaneChangeActionDynamics",
-        dynamicsShape="sinusoidal",
-        dynamicsDimension="time",
-        value=float(over),
+        dynamicsShape=_SHAPES[part.shape],
+        dynamicsDimension=dimension,
+        value=float(value),
     )
     change = xml(
         "LaneChangeAction", dynamics, xml("LaneChangeTarget", target), targetLaneOffset=offset
@@ -149,7 +157,7 @@ def _write_lane(_made: Actions, part: Any, actor: str, _where: str) -> list[_Ele
     if part.by is None:
         raise CannotSayError("a change to the lane that leads to a place")
     target = xml("RelativeTargetLane", entityRef=actor, value=int(part.by))
-    return [_lane_change(part.over, target)]
+    return [_lane_change(part, target, float(part.offset) if part.offset else None)]
 
 
 def _cut_in(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]:
@@ -158,7 +166,7 @@ def _cut_in(made: Actions, part: Any, _actor: str, where: str) -> list[_Element]
     if made.dialect.for_scenario_runner:
         words = "ScenarioRunner counts lanes from the actor's own, and changes none"
         made.notes.approximated.append((where, words))
-    return [_lane_change(part.over, xml("RelativeTargetLane", entityRef=part.to, value=0))]
+    return [_lane_change(part, xml("RelativeTargetLane", entityRef=part.to, value=0))]
 
 
 def _write_offset(made: Actions, part: Any, actor: str, where: str) -> list[_Element]:
@@ -166,15 +174,18 @@ def _write_offset(made: Actions, part: Any, actor: str, where: str) -> list[_Ele
         earlier.offset.to for earlier in made.before(part, actor) if earlier.offset is not None
     ]
     moves = abs(part.to - (asked[-1] if asked else made.actors[actor].lateral_offset))
-    if not moves and not made.dialect.for_scenario_runner:  # no acceleration tells how long
+    timed = part.within is None and part.rate is None
+    # Without a move no acceleration says how long it takes, and none does of a length or a rate.
+    if not (moves and timed) and not made.dialect.for_scenario_runner:
         own = xml("RelativeTargetLane", entityRef=actor, value=0)
-        return [_lane_change(part.over, own, float(part.to))]
+        return [_lane_change(part, own, float(part.to))]
     made.notes.approximated.append((where, "an offset has no duration but an acceleration"))
-    # Greatest of y = moves / 2 (1 - cos(pi t / over)).
-    greatest = math.pi**2 * moves / (2.0 * part.over**2)
+    seconds = part.over or USUAL_MOVE
+    # Greatest |e''| of a half-cosine and of a cubic.
+    greatest = (math.pi**2 / 2.0 if part.shape == "cosine" else 6.0) * moves / seconds**2
     dynamics = xml(
         "LaneOffsetActionDynamics",
-        dynamicsShape="sinusoidal",
+        dynamicsShape=_SHAPES[part.shape],
         maxLateralAcc=greatest if greatest > _STILL else None,
     )
     target = xml("LaneOffsetTarget", xml("AbsoluteTargetLaneOffset", value=float(part.to)))
@@ -192,7 +203,8 @@ def _keep_gap(made: Actions, part: Any, _actor: str, where: str) -> list[_Elemen
         about = {"coordinateSystem": "entity", "displacement": f"{side}ReferencedEntity"}
     elif part.ahead:
         made.notes.approximated.append((where, "1.0 does not say that the gap is ahead"))
-    limits = xml("DynamicConstraints", maxAcceleration=part.rate, maxDeceleration=part.rate,
+    slowing = part.rate if part.braking is None else part.braking
+    limits = xml("DynamicConstraints", maxAcceleration=part.rate, maxDeceleration=slowing,
                  maxSpeed=70.0)  # fmt: skip
     return [
         private(

@@ -226,11 +226,11 @@ WalkingSpeed = Annotated[float, Field(gt=0, le=15, allow_inf_nan=False)]
 class SpeedChange(Part):
     """Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
 
-    None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
+    None of the three is wanted for the shape ``step``. Of a curve the rate is the largest.
     """
 
     to: RuleSpeed
-    shape: Literal["step", "linear", "cosine"] = "linear"
+    shape: Literal["step", "linear", "cosine", "cubic"] = "linear"
     rate: Rate | None = None
     over: Positive | None = None
     within: Positive | None = None
@@ -262,15 +262,39 @@ class Going(Part):
     """SUMO chooses the speed again."""
 
 
-class LaneChange(Part):
+USUAL_MOVE = 3.0
+"""Seconds of a lateral move that says neither time nor length nor rate."""
+SideShape = Literal["linear", "cosine", "cubic"]
+"""How the offset of a lateral move grows with the time, or with the metres."""
+
+
+class SidewaysMove(Part):
+    """A lateral move: ``over`` seconds, ``within`` metres along the lane or with a ``rate``.
+
+    The rate is the largest speed to the side, m/s. Without any of the three it takes 3 s.
+    """
+
+    @model_validator(mode="after")
+    def _check_one_measure(self) -> Self:
+        names = ("over", "within", "rate")
+        if any(getattr(self, name) is not None for name in names):
+            one_of(self, names, "measure")
+        return self
+
+
+class LaneChange(SidewaysMove):
     """Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
 
-    It takes ``over`` seconds.
+    It ends ``offset`` metres to the left of the centre of that lane.
     """
 
     by: Annotated[int, Field(ge=-10, le=10)] | None = None
     to: RulePlace | None = None
-    over: Positive = 3.0
+    over: Positive | None = None
+    within: Positive | None = None
+    rate: Rate | None = None
+    shape: SideShape = "cosine"
+    offset: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
 
     @model_validator(mode="after")
     def _some_lane(self) -> Self:
@@ -280,28 +304,42 @@ class LaneChange(Part):
         return self
 
 
-class CuttingIn(Part):
-    """Change into the lane of ``to``, in front of it, ``over`` so many seconds.
+class CuttingIn(SidewaysMove):
+    """Change into the lane of ``to``, in front of it.
 
-    With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
+    With ``gap`` the speed changes evenly so that the free gap is that many metres in the end; then
+    the change takes a time, and no length.
     """
 
     to: Identifier
     gap: Positive | None = None
-    over: Positive = 3.0
+    over: Positive | None = None
+    within: Positive | None = None
+    rate: Rate | None = None
+    shape: SideShape = "cosine"
+
+    @model_validator(mode="after")
+    def _check_time_for_gap(self) -> Self:
+        if self.gap is not None and self.within is not None:
+            raise ValueError("a gap is reached over a time; give over, not within")
+        return self
 
 
-class LateralMove(Part):
-    """Move to ``to`` metres left of the lane's centre, ``over`` so many seconds."""
+class LateralMove(SidewaysMove):
+    """Move to ``to`` metres left of the lane's centre."""
 
     to: Annotated[float, Field(ge=-10, le=10)]
-    over: Positive = 3.0
+    over: Positive | None = None
+    within: Positive | None = None
+    rate: Rate | None = None
+    shape: SideShape = "cosine"
 
 
 class GapKeeping(Part):
     """Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
 
     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
+    ``rate`` is the strongest acceleration, and deceleration where ``braking`` says no other one.
     """
 
     to: Identifier
@@ -310,6 +348,7 @@ class GapKeeping(Part):
     ahead: bool = False
     lasting: Positive | None = None
     rate: Rate = 3.0
+    braking: Rate | None = None
     once: bool = False
 
     @model_validator(mode="after")

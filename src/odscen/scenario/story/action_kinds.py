@@ -14,8 +14,10 @@ from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from odscen.scenario.document.rules_document import USUAL_MOVE
 from odscen.scenario.story.channels import ActingActor, CannotAct
 from odscen.scenario.story.motion_laws import (
+    STEEPEST,
     SideLaw,
     SpeedLaw,
     SpeedTable,
@@ -58,6 +60,8 @@ if TYPE_CHECKING:
     from odscen.scenario.story.channels import Channel
     from odscen.scenario.story.motion_laws import AnyLaw
     from odscen.scenario.story.road_view import ActorView, Point, RoadView
+
+    _Sideways = LaneChange | CuttingIn | LateralMove
 
 
 _SHORT = 1e-9
@@ -427,8 +431,7 @@ def change_lane(part: LaneChange, acting_actor: ActingActor) -> float:
         missing = f"there is no lane {abs(by)} to the {'left' if by > 0 else 'right'} for it"
     if line is None or not _leads_on(line, _front_of_actor(acting_actor), acting_actor.actor.hdg):
         raise CannotAct(missing)
-    _beside_lane(line, 0.0, part.over, acting_actor)
-    return acting_actor.instant + part.over
+    return _beside_lane(line, part.offset, part, acting_actor)
 
 
 def _back_in_lane(by: int, acting_actor: ActingActor) -> tuple[Point, ...] | None:
@@ -465,8 +468,7 @@ def move_aside(part: LateralMove, acting_actor: ActingActor) -> float:
     line = led or acting_actor.view.lane_line(acting_actor.actor.id, 0)
     if line is None:
         raise CannotAct("it is on no lane")
-    _beside_lane(line, part.to, part.over, acting_actor)
-    return acting_actor.instant + part.over
+    return _beside_lane(line, part.to, part, acting_actor)
 
 
 def cut_in(part: CuttingIn, acting_actor: ActingActor) -> float:
@@ -481,8 +483,7 @@ def cut_in(part: CuttingIn, acting_actor: ActingActor) -> float:
     line = acting_actor.view.lane_line(part.to, 0)
     if line is None:
         raise CannotAct(f"{part.to!r} is on no lane")
-    _beside_lane(line, 0.0, part.over, acting_actor)
-    end = acting_actor.instant + part.over
+    end = _beside_lane(line, 0.0, part, acting_actor)
     _reach_gap(part, acting_actor, other, end)
     return end
 
@@ -497,8 +498,9 @@ def cut_in_further(part: CuttingIn, acting_actor: ActingActor, end: float) -> fl
     CannotAct
         If the lane ends, or the gap cannot be reached in time.
     """
-    lane_lasts(part, acting_actor, end)
-    if end - acting_actor.instant > part.over / 2.0:
+    end = lane_lasts(part, acting_actor, end)
+    side = acting_actor.channel.side
+    if side is not None and end - acting_actor.instant > side.duration / 2.0:
         _reach_gap(part, acting_actor, _other_actor(part, acting_actor), end)
     return end
 
@@ -511,7 +513,7 @@ def after_cut_in(part: CuttingIn, acting_actor: ActingActor) -> None:
 
 
 def lane_lasts(_: object, acting_actor: ActingActor, end: float) -> float:
-    """Look whether the lane goes on.
+    """Look whether the lane goes on, and when a change within so many metres is done.
 
     Raises
     ------
@@ -522,7 +524,12 @@ def lane_lasts(_: object, acting_actor: ActingActor, end: float) -> float:
     metres = channel.metres(acting_actor.instant, acting_actor.instant + acting_actor.step)
     if channel.along + metres > line_length(channel.line or ()):
         raise CannotAct("the lane ends before it is there")
-    return end
+    side = channel.side
+    if side is None or side.length is None or end < math.inf:
+        return end
+    begin = acting_actor.view.time
+    done = channel.reaches(side.start + side.length, begin, begin + acting_actor.step)
+    return end if done is None else max(done, acting_actor.instant)
 
 
 def leave_aside(part: LateralMove, acting_actor: ActingActor) -> None:
@@ -557,15 +564,17 @@ def _other_actor(part: CuttingIn, acting_actor: ActingActor) -> ActorView:
 
 
 def _beside_lane(
-    line: tuple[Point, ...], left: float, over: float, acting_actor: ActingActor
-) -> None:
-    """Move the front to ``left`` metres of a line."""
-    place = beside(line, _front_of_actor(acting_actor))
-    side = SideLaw(acting_actor.instant, place.left, left, over)
-    acting_actor.channel.take_line(
-        line, place.along, side, acting_actor.owner, acting_actor.instant
-    )
+    line: tuple[Point, ...], left: float, part: _Sideways, acting_actor: ActingActor
+) -> float:
+    """Move the front to ``left`` metres of a line; returns when it is there, if that is known."""
+    place, instant = beside(line, _front_of_actor(acting_actor)), acting_actor.instant
+    seconds = USUAL_MOVE if part.over is None else part.over
+    if part.rate is not None:
+        seconds = max(STEEPEST[part.shape] * abs(left - place.left) / part.rate, 1e-9)
+    side = SideLaw(instant, place.left, left, seconds, part.shape, place.along, part.within)
+    acting_actor.channel.take_line(line, place.along, side, acting_actor.owner, instant)
     acting_actor.channel.keeps_lane = True
+    return math.inf if part.within is not None else instant + seconds
 
 
 def _front_of_actor(acting_actor: ActingActor) -> Point:
@@ -850,11 +859,12 @@ def _follow_gap(part: GapKeeping, acting_actor: ActingActor) -> bool:
     behind = other.speed if part.ahead else speed
     wanted = part.metres if part.metres is not None else (part.seconds or 0.0) * behind
     error = wanted - gap if part.ahead else gap - wanted
+    slowing = part.rate if part.braking is None else part.braking
     # Far away no faster than half the rate can take back in time.
-    faster = min(_GAP_GAIN * abs(error), math.sqrt(part.rate * abs(error)))
+    faster = min(_GAP_GAIN * abs(error), math.sqrt(min(part.rate, slowing) * abs(error)))
     target = max(0.0, other.speed + math.copysign(faster, error))
-    most = part.rate * acting_actor.step
-    reached = min(max(target, speed - most), speed + most)
+    step = acting_actor.step
+    reached = min(max(target, speed - slowing * step), speed + part.rate * step)
     left = acting_actor.view.time + acting_actor.step - acting_actor.instant
     law = SpeedLaw(acting_actor.instant, speed, reached, max(left, 1e-9))
     acting_actor.channel.take_speed(law, acting_actor.owner)
@@ -901,7 +911,7 @@ ACTIONS = {
     for action_kind in (
         ActionKind(
             "speed", "reach `to` at a `rate`, `over` seconds or `within` metres; then keep it, as "
-            "far as traffic allows. Shapes: `step`, `linear`, `cosine`", "m/s, m/s², s, m",
+            "far as traffic allows. Shapes: `step`, `linear`, `cosine`, `cubic`", "m/s, m/s², s, m",
             "`setSpeed` each step", "SpeedAction", _MIRRORED, _begin_speed,
             finish=_begin_keep_speed,
         ),
@@ -922,27 +932,29 @@ ACTIONS = {
         ),
         ActionKind(
             "lane", "change `by` lanes to the left (negative: right), or to the lane that leads "
-            "`to` a place, `over` so many seconds on a half-cosine; the speed stays unless another "
-            "action changes it", "s",
-            "`moveToXY`", "LaneChangeAction (sinusoidal)", _MIRRORED, change_lane, lane_lasts,
+            "`to` a place, and there `offset` metres to the left of its centre: `over` so many "
+            "seconds, `within` so many metres or with `rate` to the side at most; the speed stays "
+            "unless another action changes it. Shapes: `cosine`, `cubic`, `linear`", "s, m, m/s",
+            "`moveToXY`", "LaneChangeAction", _MIRRORED, change_lane, lane_lasts,
             leave_line, vehicles_only=True,
         ),
         ActionKind(
-            "cut_in", "change into the lane of `to`, `over` so many seconds on a half-cosine; with "
+            "cut_in", "change into the lane of `to`, with the measures and shapes of `lane`; with "
             "`gap` the speed changes evenly so that the gap behind it is that in the end, if `to` "
             "keeps its speed", "m, s", "`moveToXY`, `setSpeed`",
             "LaneChangeAction (RelativeTargetLane), SpeedAction", _MIRRORED, cut_in,
             cut_in_further, after_cut_in, vehicles_only=True,
         ),
         ActionKind(
-            "offset", "move the front to `to` metres left of the lane's centre, `over` so many "
-            "seconds on a half-cosine", "m, s", "`moveToXY`", "LaneOffsetAction", _MIRRORED,
+            "offset", "move the front to `to` metres left of the lane's centre, with the measures "
+            "and shapes of `lane`", "m, s, m/s", "`moveToXY`", "LaneOffsetAction", _MIRRORED,
             move_aside, lane_lasts, leave_aside, vehicles_only=True,
         ),
         ActionKind(
             "keep_gap", "follow `to`, or drive `ahead` of it, at a free gap of `metres`, or of "
             "`seconds` at the speed of the one behind, "
-            "with `rate` at most; for `lasting` seconds, or `once`: until it is that", "m, s, m/s²",
+            "with `rate` at most, and `braking` where it brakes otherwise; for `lasting` seconds, "
+            "or `once`: until it is that", "m, s, m/s²",
             "`setSpeed` each step",
             "LongitudinalDistanceAction", _MIRRORED, _keep_gap, _follow_on, _begin_keep_speed,
             vehicles_only=True,

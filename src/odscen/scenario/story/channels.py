@@ -246,9 +246,14 @@ class Channel:
 
     def reaches_end(self, time: float, until: float) -> float | None:
         """Instant in this step at which the end of the line is reached, if it is."""
-        if self.line is None:
-            return None
-        rest = line_length(self.line) - self.along
+        return None if self.line is None else self.reaches(line_length(self.line), time, until)
+
+    def reaches(self, along: float, time: float, until: float) -> float | None:
+        """Instant in this step, begun at ``time``, at which so many metres of the line are reached.
+
+        ``None`` if they are not.
+        """
+        rest = along - self.along
         if self.metres(time, until) < rest - 1e-9:
             return None
         early, late = time, until
@@ -296,13 +301,14 @@ class Channel:
 
     def _pose_at(self, instant: float, *, person: bool) -> Pose:
         line = self.line or ()
-        left = self.side.offset(instant) if self.side else 0.0
         along = min(self.along, line_length(line)) if person else self.along
+        left = self.side.offset(instant, along) if self.side else 0.0
         found = point_on(line, along, left=left)
         if self.headings is not None:
             return Pose(found.x, found.y, heading_on(line, self.headings, along))
         speed = self.speed(instant)
-        turned = math.atan2(self.side.sideways(instant), speed) if self.side and speed else 0.0
+        aside = self.side.sideways(instant, along, speed) if self.side else 0.0
+        turned = math.atan2(aside, speed) if speed else 0.0
         hdg = found.hdg + turned + (math.pi if self.backwards else 0.0)
         ahead = self.behind
         return Pose(found.x + ahead * math.cos(hdg), found.y + ahead * math.sin(hdg), hdg)

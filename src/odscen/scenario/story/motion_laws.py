@@ -1,13 +1,20 @@
 """How speeds change over time, and lines on the ground that road users are moved along.
 
-The offset is a half-cosine over time: it begins and ends without sideways speed.
+What changes, a speed or an offset, has done a share p of it, with x = t/T from 0 to 1:
 
-    e(t) = e0 + (e1 - e0) (1 - cos(pi t/T)) / 2
+    linear  p = x
+    cosine  p = (1 - cos(pi x)) / 2
+    cubic   p = x^2 (3 - 2 x)
 
-    linear  v(t) = v0 + dv t/T                 s(t) = v0 t + dv t^2 / (2 T)
-    cosine  v(t) = v0 + dv (1 - cos(pi t/T))/2 s(t) = v0 t + dv/2 (t - T/pi sin(pi t/T))
+Of the last two it begins and ends without a change; they are fastest in the middle, pi/2 and 3/2
+times as fast as the first. An offset may also change with the metres along its line; x is then the
+share of these.
 
-with t from 0 to T, dv = v1 - v0; before it the speed is v0, after it v1.
+    v(t) = v0 + dv p                    e(t) = e0 + de p
+    s(t) = v0 t + dv T P(x), P the integral of p from 0 to x: x^2/2, (x - sin(pi x)/pi)/2 and
+           x^3 - x^4/2
+
+with dv = v1 - v0; before it the speed is v0, after it v1.
 """
 
 from __future__ import annotations
@@ -25,6 +32,31 @@ if TYPE_CHECKING:
     from odscen.scenario.story.road_view import Point
 
 
+def share_done(shape: str, x: float) -> float:
+    """Share of a change that is done after a share ``x``, 0 to 1, of its time or metres."""
+    if shape == "cosine":
+        return (1.0 - math.cos(math.pi * x)) / 2.0
+    return x * x * (3.0 - 2.0 * x) if shape == "cubic" else x
+
+
+def share_slope(shape: str, x: float) -> float:
+    """Derivative of :func:`share_done`: how fast it changes after ``x``, of an even change."""
+    if shape == "cosine":
+        return math.pi * math.sin(math.pi * x) / 2.0
+    return 6.0 * x * (1.0 - x) if shape == "cubic" else 1.0
+
+
+def _share_summed(shape: str, x: float) -> float:
+    """Integral of :func:`share_done` from 0 to ``x``."""
+    if shape == "cosine":
+        return (x - math.sin(math.pi * x) / math.pi) / 2.0
+    return x**3 - x**4 / 2.0 if shape == "cubic" else x * x / 2.0
+
+
+STEEPEST = {"linear": 1.0, "cosine": math.pi / 2.0, "cubic": 1.5}
+"""How much faster than in an even change it changes at most, by shape."""
+
+
 @dataclass(frozen=True, slots=True)
 class SpeedLaw:
     """From ``begin`` on, within ``duration`` seconds, from ``v0`` to ``v1``.
@@ -36,7 +68,7 @@ class SpeedLaw:
     v0, v1
         First and last speed, m/s.
     shape
-        ``linear`` or ``cosine``.
+        ``linear``, ``cosine`` or ``cubic``.
     """
 
     begin: float
@@ -55,9 +87,7 @@ class SpeedLaw:
         t = instant - self.begin
         if t >= self.duration:
             return self.v1
-        share = max(t, 0.0) / self.duration
-        if self.shape == "cosine":
-            share = (1.0 - math.cos(math.pi * share)) / 2.0
+        share = share_done(self.shape, max(t, 0.0) / self.duration)
         return self.v0 + (self.v1 - self.v0) * share
 
     def metres(self, start: float, stop: float) -> float:
@@ -71,10 +101,7 @@ class SpeedLaw:
         covered = self.v0 * inside + self.v1 * (t - inside)
         if inside <= 0.0:
             return covered
-        if self.shape == "cosine":
-            turn = math.pi / self.duration
-            return covered + change / 2.0 * (inside - math.sin(turn * inside) / turn)
-        return covered + change * inside * inside / (2.0 * self.duration)
+        return covered + change * self.duration * _share_summed(self.shape, inside / self.duration)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,9 +175,7 @@ def speed_change(change: SpeedChange, begin: float, speed: float) -> SpeedLaw:
     elif change.within is not None:
         duration = 2.0 * change.within / max(change.to + speed, 1e-9)
     elif change.rate is not None:
-        duration = difference / change.rate
-        if change.shape == "cosine":
-            duration *= math.pi / 2.0
+        duration = STEEPEST.get(change.shape, 1.0) * difference / change.rate
     if difference == 0.0 and change.over is None:
         duration = 0.0
     return SpeedLaw(begin, speed, change.to, duration, change.shape)
@@ -170,30 +195,46 @@ def stopping(within: float | None, begin: float, speed: float) -> SpeedLaw:
 
 @dataclass(frozen=True, slots=True)
 class SideLaw:
-    """Offset to the left of a line, from ``e0`` to ``e1`` metres within ``duration`` seconds."""
+    """Offset to the left of a line, from ``e0`` to ``e1`` metres.
+
+    Attributes
+    ----------
+    begin, duration
+        Instant, and seconds from there to the last offset; 0 of a change with the metres.
+    e0, e1
+        First and last offset, metres.
+    shape
+        ``linear``, ``cosine`` or ``cubic``.
+    start, length
+        Metres along the line at which it begins, and within which it changes; no length if it
+        changes with time.
+    """
 
     begin: float
     e0: float
     e1: float
     duration: float
+    shape: str = "cosine"
+    start: float = 0.0
+    length: float | None = None
 
-    @property
-    def end(self) -> float:
-        """Instant from which on the offset is ``e1``."""
-        return self.begin + self.duration
+    def offset(self, instant: float, along: float) -> float:
+        """Metres to the left of the line at an instant, ``along`` metres of it."""
+        share = min(1.0, max(0.0, self._share(instant, along)))
+        return self.e0 + (self.e1 - self.e0) * share_done(self.shape, share)
 
-    def offset(self, instant: float) -> float:
-        """Metres to the left of the line."""
-        share = min(1.0, max(0.0, (instant - self.begin) / self.duration))
-        return self.e0 + (self.e1 - self.e0) * (1.0 - math.cos(math.pi * share)) / 2.0
-
-    def sideways(self, instant: float) -> float:
-        """Speed to the left, m/s."""
-        share = (instant - self.begin) / self.duration
+    def sideways(self, instant: float, along: float, speed: float) -> float:
+        """Speed to the left, m/s, at ``speed`` m/s along the line."""
+        share = self._share(instant, along)
         if not 0.0 < share < 1.0:
             return 0.0
-        turn = math.pi / self.duration
-        return (self.e1 - self.e0) * turn * math.sin(math.pi * share) / 2.0
+        pace = 1.0 / self.duration if self.length is None else speed / self.length
+        return (self.e1 - self.e0) * pace * share_slope(self.shape, share)
+
+    def _share(self, instant: float, along: float) -> float:
+        if self.length is None:
+            return (instant - self.begin) / self.duration
+        return (along - self.start) / self.length
 
 
 class OnLine(NamedTuple):

@@ -19,6 +19,7 @@ from odscen.formats.openscenario_import.story.read_motions import (
     teleported,
 )
 from odscen.lanegraph.query import node_id
+from odscen.scenario.story.motion_laws import STEEPEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -88,9 +89,7 @@ def to_opposite(
 
 # -------------------------------------------------------------- private actions as actions of rules
 Made = dict[str, Any]
-_SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cosine"}
-_PEAKS: Final = {"linear": 1.0, "sinusoidal": math.pi / 2.0, "cubic": 1.5}
-"""Greatest rate of a change, in those of an even one."""
+_SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cubic"}
 _MEASURES: Final = {"time": "over", "rate": "rate", "distance": "within"}
 FOLLOWING: Final = "following"
 """Key of actions that follow one another, of one action of the file."""
@@ -222,12 +221,11 @@ def _read_speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         return {"stop": {}}
     if shape == "step" or value == 0:
         return {"speed": {"to": to, "shape": "step"}}
-    if shape == "cubic":
-        report.mark(dynamics, "approximated", "a cubic is a half-cosine")
     measure = _MEASURES.get(dynamics.get("dynamicsDimension", "time"), "over")
     value = min(abs(value), 100.0) if measure == "rate" else abs(value)
     most = _performance_limit(read, entity, faster=to > before)
-    peak = _PEAKS.get(shape, 1.0) * abs(to - before)
+    shape = _SHAPES.get(shape, "linear")
+    peak = STEEPEST[shape] * abs(to - before)
     if measure == "rate" and value > most:
         report.mark(dynamics, "approximated", f"{most:g} m/s², the most of its Performance")
         value = most
@@ -235,9 +233,7 @@ def _read_speed(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         value = round(float(peak / most), 4)
         words = f"{value:g} s from {before:g} m/s, as its Performance allows {most:g} m/s²"
         report.mark(dynamics, "approximated", words)
-    if shape == "cubic" and measure == "rate":  # a half-cosine that takes as long
-        value *= _PEAKS["sinusoidal"] / _PEAKS["cubic"]
-    return {"speed": {"to": to, "shape": _SHAPES.get(shape, "linear"), measure: value}}
+    return {"speed": {"to": to, "shape": shape, measure: value}}
 
 
 def _performance_limit(read: ActionReader, entity: ReadEntity, *, faster: bool) -> float:
@@ -252,47 +248,41 @@ def _performance_limit(read: ActionReader, entity: ReadEntity, *, faster: bool) 
     return float(most) if most > 0 else math.inf
 
 
-def _read_duration(read: ActionReader, dynamics: _Element | None, entity: ReadEntity) -> float:
-    """Seconds of a change of lane."""
+def _read_dynamics(read: ActionReader, dynamics: _Element | None) -> Made:
+    """Duration, length or rate of a change of lane, and its shape."""
     report = read.conditions.report
     if dynamics is None:
-        return _USUAL
+        return {"over": _USUAL}
     value = abs(report.number(dynamics, "value", 0.0))
-    measure = dynamics.get("dynamicsDimension", "time")
-    if dynamics.get("dynamicsShape") == "step" or value == 0:
+    shape = dynamics.get("dynamicsShape", "sinusoidal")
+    if shape == "step" or value == 0:
         report.mark(dynamics, "approximated", "at once is within 0.1 s")
-        return 0.1
-    if dynamics.get("dynamicsShape") != "sinusoidal":
-        report.mark(dynamics, "approximated", "the line is a half-cosine")
-    if measure == "rate":
-        seconds = 3.5 / value
-        report.mark(dynamics, "approximated", f"{seconds:.2f} s, for a lane of 3.5 m")
-    elif measure == "distance":
-        seconds = value / max(read.speeds.get(entity.id, 0.0), 1.0)
-        report.mark(dynamics, "approximated", f"{seconds:.2f} s, at the last speed of the file")
-    else:
-        seconds = value
-    return seconds
+        return {"over": 0.1}
+    measure = _MEASURES.get(dynamics.get("dynamicsDimension", "time"), "over")
+    value = min(value, 100.0) if measure == "rate" else value
+    how: Made = {measure: value}
+    return how if shape == "sinusoidal" else how | {"shape": _SHAPES.get(shape, "linear")}
 
 
 def _read_lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     report = read.conditions.report
-    over = _read_duration(read, report.child(kind, "LaneChangeActionDynamics"), entity)
+    how = _read_dynamics(read, report.child(kind, "LaneChangeActionDynamics"))
     target = report.child(kind, "LaneChangeTarget")
     lane = None if target is None else report.only(target)
     if lane is None:
         raise RefusedError(kind, "a change of lane without a target")
     value = int(report.number(lane, "value"))
-    if report.number(kind, "targetLaneOffset", 0.0):
-        report.mark(kind, "approximated", "to the middle of another lane, not beside it")
+    beyond = report.number(kind, "targetLaneOffset", 0.0)
     if lane.tag == "RelativeTargetLane":
         other = read.conditions.actor(lane)
         if other == entity.id and value:
-            return _to_own_neighbour(read, lane, entity, value, over)
+            return _to_own_neighbour(read, lane, entity, value, how | _named_offset(beyond))
         if other != entity.id and value == 0:
-            return {"cut_in": {"to": other, "over": over}}
+            if beyond:
+                report.mark(kind, "approximated", "to the middle of another lane, not beside it")
+            return {"cut_in": {"to": other, **how}}
         if other == entity.id:
-            return _within_lane(read, kind, entity, over)
+            return _within_lane(read, kind, entity, how)
         road, own, side = start_lane(read.conditions, lane, entity.id)
         beside, its, _ = start_lane(read.conditions, lane, other)
         if road != beside:
@@ -309,24 +299,29 @@ def _read_lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         words = f"{by:+d} lanes from the last one that the file names for it"
     if by == 0:
         report.mark(lane, "approximated", "by none, in the lane in which it is")
-        return _within_lane(read, kind, entity, over)
+        return _within_lane(read, kind, entity, how)
     if (
         abs(by) == 1
         and (metres := to_opposite(read.conditions, entity.id, road, own, aim)) is not None
     ):
         words = f"{metres:.2f} m beside its own lane, in the opposite one"
         report.mark(lane, "approximated", words)
-        read.offsets[entity.id] = by * metres
-        return {"offset": {"to": by * metres, "over": over}}
+        read.offsets[entity.id] = by * metres + beyond
+        return {"offset": {"to": by * metres + beyond, **how}}
     report.mark(lane, "approximated", words)
-    return {"lane": {"by": by, "over": over}}
+    return {"lane": {"by": by, **how, **_named_offset(beyond)}}
+
+
+def _named_offset(metres: float) -> Made:
+    """The offset from the centre of the lane that a change ends at, if there is one."""
+    return {"offset": metres} if metres else {}
 
 
 def _to_own_neighbour(
-    read: ActionReader, lane: _Element, entity: ReadEntity, by: int, over: float
+    read: ActionReader, lane: _Element, entity: ReadEntity, by: int, how: Made
 ) -> Made:
     """Change of so many lanes from its own one; beside it if that is the opposite one."""
-    change: Made = {"lane": {"by": by, "over": over}}
+    change: Made = {"lane": {"by": by, **how}}
     if read.own or start_of(read.conditions, entity.id) is None:
         return change
     road, own, side = start_lane(read.conditions, lane, entity.id)
@@ -339,16 +334,17 @@ def _to_own_neighbour(
         return change
     words = f"{metres:.2f} m beside its own lane, in the opposite one"
     read.conditions.report.mark(lane, "approximated", words)
-    read.offsets[entity.id] = by * metres
-    return {"offset": {"to": by * metres, "over": over}}
+    beyond = how.pop("offset", 0.0)
+    read.offsets[entity.id] = by * metres + beyond
+    return {"offset": {"to": by * metres + beyond, **how}}
 
 
-def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, over: float) -> Made:
+def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, how: Made) -> Made:
     """Change of no lanes: to the middle of its own, or beside it."""
     metres = read.conditions.report.number(kind, "targetLaneOffset", 0.0)
     metres += _beside_at_first(read, entity)[0]
     read.offsets[entity.id] = metres
-    return {"offset": {"to": metres, "over": max(over, 0.1)}}
+    return {"offset": {"to": metres, **how}}
 
 
 def _read_offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
@@ -369,9 +365,20 @@ def _read_offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made
     moves = metres - read.offsets.get(entity.id, start)
     read.offsets[entity.id] = metres
     most = 0.0 if dynamics is None else report.number(dynamics, "maxLateralAcc", 0.0)
-    over = math.pi * math.sqrt(abs(moves) / (2.0 * most)) if most > 0 and moves else _USUAL
-    report.mark(kind, "approximated", f"a half-cosine of {over:.2f} s")
-    return {"offset": {"to": metres, "over": max(over, 0.1)}}
+    shape = "sinusoidal" if dynamics is None else dynamics.get("dynamicsShape", "sinusoidal")
+    if shape == "step":
+        report.mark(kind, "approximated", "at once is within 0.1 s")
+        return {"offset": {"to": metres, "over": 0.1}}
+    over = _USUAL
+    if most > 0 and moves:
+        # Greatest |e''| of a half-cosine is pi^2 de / (2 T^2), that of a cubic 6 de / T^2; that of
+        # an even change is infinite, which lasts as long as a cubic.
+        greatest = math.pi**2 / 2.0 if shape == "sinusoidal" else 6.0
+        over = max(math.sqrt(greatest * abs(moves) / most), 0.1)
+    if most <= 0 or shape == "linear":
+        report.mark(kind, "approximated", f"over {over:.2f} s")
+    named_shape = {} if shape == "sinusoidal" else {"shape": _SHAPES.get(shape, "cosine")}
+    return {"offset": {"to": metres, "over": over, **named_shape}}
 
 
 def _read_abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
@@ -431,9 +438,15 @@ def _read_gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
         part["seconds"] = max(report.number(kind, "timeGap"), 0.01)
     limits = report.child(kind, "DynamicConstraints")
     if limits is not None:
-        rate = report.number(limits, "maxAcceleration", 3.0)
-        part["rate"] = min(max(rate, 0.1), 100.0)
-        report.mark(limits, "approximated", "maxAcceleration holds for braking too")
+        for name, attribute in (("rate", "maxAcceleration"), ("braking", "maxDeceleration")):
+            most = report.number(limits, attribute, 100.0)
+            part[name] = min(max(most, 0.1), 100.0)
+        if part["braking"] == part["rate"]:
+            del part["braking"]
+        words = "only the speed of the gap keeps to maxAcceleration and maxDeceleration"
+        for attribute in ("maxAccelerationRate", "maxDecelerationRate"):
+            if limits.get(attribute) is not None:
+                report.mark(limits, "approximated", words)
     if kind.get("continuous") == "false":
         part["once"] = True
         if limits is None:
