@@ -7,6 +7,7 @@ SUMO brakes for what is in front of it.
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -176,13 +177,14 @@ def test_the_lead_vehicle_brakes_to_a_standstill_and_the_ego_stops_behind_it(fol
 @pytest.mark.parametrize(
     ("name", "seconds", "gap"),
     [
-        ("4_4_1_cut_in_no_collision", 3.5 / 2.0, 30),
-        ("4_4_2_cut_in_unavoidable_collision", 3.5 / 3.0, 10),
+        ("4_4_1_cut_in_no_collision", math.pi / 2.0 * 3.5 / 2.0, 30),
+        ("4_4_2_cut_in_unavoidable_collision", math.pi / 2.0 * 3.5 / 3.0, 10),
     ],
 )
 def test_a_slower_vehicle_cuts_into_the_lane_of_the_ego_ahead_of_it(
     folder: Path, name: str, seconds: float, gap: float
 ) -> None:
+    # The rate of the file is its largest lateral speed, pi/2 times the mean of a half-cosine.
     motions = story(folder, name)
     other, ego = motions["CutInVehicle"], motions["Ego"]
     assert other.y[0] == pytest.approx(LANE - WIDTH, abs=0.05)

@@ -181,7 +181,7 @@ def test_a_cut_in_is_built_and_fires(
     hand.choose("Condition", "Distance travelled")
     hand.choose("Bound", "Above")
     hand.write("Above", "10")
-    hand.write("Duration", "2.5")
+    hand.write("In a time", "2.5")
     with user.changing():
         hand.press(user.page.get_by_role("button", name="Add the rule"))
     words = "When distance travelled by van-1 is above 10 m, cut in before car-1 over 2.5 s."

@@ -98,7 +98,7 @@ def make_story(user: OdscenPage, name: str) -> None:
     user.choose("Action", "Stop")
     add_rule(user)
     begin_rule(user, hand, "cut-in", "van-1")
-    hand.write("Duration", "2")
+    hand.write("In a time", "2")
     page.get_by_role("button", name="Add parallel action to action").click()
     user.choose("Action, part 2", "Reach a speed")
     page.get_by_label("Speed", exact=True).fill("32.4")

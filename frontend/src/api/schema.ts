@@ -1728,26 +1728,40 @@ export interface components {
             width: number;
         };
         /**
-         * @description Change into the lane of ``to``, in front of it, ``over`` so many seconds.
+         * @description Change into the lane of ``to``, in front of it.
          *
-         *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
+         *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end; then
+         *     the change takes a time, and no length.
          */
         "CuttingIn-Input": {
             to: string;
             gap?: number | null;
-            /** @default 3 */
-            over?: number;
+            over?: number | null;
+            within?: number | null;
+            rate?: number | null;
+            /**
+             * @default cosine
+             * @enum {string}
+             */
+            shape?: "linear" | "cosine" | "cubic";
         };
         /**
-         * @description Change into the lane of ``to``, in front of it, ``over`` so many seconds.
+         * @description Change into the lane of ``to``, in front of it.
          *
-         *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end.
+         *     With ``gap`` the speed changes evenly so that the free gap is that many metres in the end; then
+         *     the change takes a time, and no length.
          */
         "CuttingIn-Output": {
             to: string;
             gap: number | null;
-            /** @default 3 */
-            over: number;
+            over: number | null;
+            within: number | null;
+            rate: number | null;
+            /**
+             * @default cosine
+             * @enum {string}
+             */
+            shape: "linear" | "cosine" | "cubic";
         };
         /** @description Another cycle for a light, seconds; ``plan`` is a plan of the day where it has several. */
         CycleWish: {
@@ -1923,7 +1937,11 @@ export interface components {
                 number
             ][];
         };
-        /** @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres. */
+        /**
+         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
+         *
+         *     Without ``free`` the points measured between are ``behind`` metres behind the two centres.
+         */
         "DistanceBounded-Input": {
             below?: number | null;
             above?: number | null;
@@ -1940,8 +1958,22 @@ export interface components {
             along?: "straight" | "longitudinal" | "lateral" | "lane";
             /** @default true */
             free?: boolean;
+            /**
+             * @default [
+             *       0,
+             *       0
+             *     ]
+             */
+            behind?: [
+                number,
+                number
+            ];
         };
-        /** @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres. */
+        /**
+         * @description A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
+         *
+         *     Without ``free`` the points measured between are ``behind`` metres behind the two centres.
+         */
         "DistanceBounded-Output": {
             below: number | null;
             above: number | null;
@@ -1958,6 +1990,16 @@ export interface components {
             along: "straight" | "longitudinal" | "lateral" | "lane";
             /** @default true */
             free: boolean;
+            /**
+             * @default [
+             *       0,
+             *       0
+             *     ]
+             */
+            behind: [
+                number,
+                number
+            ];
         };
         /** @description One operation of JSON Patch; ``path`` is a JSON pointer, ``value`` is null for ``remove``. */
         DocumentChange: {
@@ -2344,6 +2386,7 @@ export interface components {
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
          *
          *     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
+         *     ``rate`` is the strongest acceleration, and deceleration where ``braking`` says no other one.
          */
         "GapKeeping-Input": {
             to: string;
@@ -2354,6 +2397,7 @@ export interface components {
             lasting?: number | null;
             /** @default 3 */
             rate?: number;
+            braking?: number | null;
             /** @default false */
             once?: boolean;
         };
@@ -2361,6 +2405,7 @@ export interface components {
          * @description Follow ``to`` at a free gap of ``metres`` or ``seconds``, for ``lasting`` seconds.
          *
          *     ``ahead``: drive in front of it at that gap, seconds at its speed. ``once``: until it is that.
+         *     ``rate`` is the strongest acceleration, and deceleration where ``braking`` says no other one.
          */
         "GapKeeping-Output": {
             to: string;
@@ -2371,6 +2416,7 @@ export interface components {
             lasting: number | null;
             /** @default 3 */
             rate: number;
+            braking: number | null;
             /** @default false */
             once: boolean;
         };
@@ -2713,7 +2759,7 @@ export interface components {
         /**
          * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
          *
-         *     It takes ``over`` seconds.
+         *     It ends ``offset`` metres to the left of the centre of that lane.
          */
         "LaneChange-Input": {
             by?: number | null;
@@ -2721,13 +2767,21 @@ export interface components {
                 number,
                 number
             ] | null;
-            /** @default 3 */
-            over?: number;
+            over?: number | null;
+            within?: number | null;
+            rate?: number | null;
+            /**
+             * @default cosine
+             * @enum {string}
+             */
+            shape?: "linear" | "cosine" | "cubic";
+            /** @default 0 */
+            offset?: number;
         };
         /**
          * @description Change ``by`` so many lanes to the left (negative: right), or to the lane that leads ``to``.
          *
-         *     It takes ``over`` seconds.
+         *     It ends ``offset`` metres to the left of the centre of that lane.
          */
         "LaneChange-Output": {
             by: number | null;
@@ -2735,8 +2789,16 @@ export interface components {
                 number,
                 number
             ] | null;
-            /** @default 3 */
-            over: number;
+            over: number | null;
+            within: number | null;
+            rate: number | null;
+            /**
+             * @default cosine
+             * @enum {string}
+             */
+            shape: "linear" | "cosine" | "cubic";
+            /** @default 0 */
+            offset: number;
         };
         /**
          * @description A broken-down vehicle that blocks a lane.
@@ -2805,17 +2867,29 @@ export interface components {
             kind: "lane_width";
             width: number;
         };
-        /** @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds. */
+        /** @description Move to ``to`` metres left of the lane's centre. */
         "LateralMove-Input": {
             to: number;
-            /** @default 3 */
-            over?: number;
+            over?: number | null;
+            within?: number | null;
+            rate?: number | null;
+            /**
+             * @default cosine
+             * @enum {string}
+             */
+            shape?: "linear" | "cosine" | "cubic";
         };
-        /** @description Move to ``to`` metres left of the lane's centre, ``over`` so many seconds. */
+        /** @description Move to ``to`` metres left of the lane's centre. */
         "LateralMove-Output": {
             to: number;
-            /** @default 3 */
-            over: number;
+            over: number | null;
+            within: number | null;
+            rate: number | null;
+            /**
+             * @default cosine
+             * @enum {string}
+             */
+            shape: "linear" | "cosine" | "cubic";
         };
         /** @description A road segment at a junction, and the side of the junction on which it lies. */
         LegInfo: {
@@ -4424,6 +4498,7 @@ export interface components {
          * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
          *
          *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         *     Without ``free`` the points measured between are ``behind`` metres behind the two centres.
          */
         "SecondsBetween-Input": {
             below?: number | null;
@@ -4434,11 +4509,22 @@ export interface components {
             free?: boolean;
             /** @default false */
             ahead?: boolean;
+            /**
+             * @default [
+             *       0,
+             *       0
+             *     ]
+             */
+            behind?: [
+                number,
+                number
+            ];
         };
         /**
          * @description Seconds between two actors; ``free`` measures between the bodies, not their centres.
          *
          *     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+         *     Without ``free`` the points measured between are ``behind`` metres behind the two centres.
          */
         "SecondsBetween-Output": {
             below: number | null;
@@ -4449,6 +4535,16 @@ export interface components {
             free: boolean;
             /** @default false */
             ahead: boolean;
+            /**
+             * @default [
+             *       0,
+             *       0
+             *     ]
+             */
+            behind: [
+                number,
+                number
+            ];
         };
         /** @description A segment and its neighbours, which are rows. */
         SegmentInfo: {
@@ -5253,7 +5349,7 @@ export interface components {
         /**
          * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
          *
-         *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
+         *     None of the three is wanted for the shape ``step``. Of a curve the rate is the largest.
          */
         "SpeedChange-Input": {
             to: number;
@@ -5261,7 +5357,7 @@ export interface components {
              * @default linear
              * @enum {string}
              */
-            shape?: "step" | "linear" | "cosine";
+            shape?: "step" | "linear" | "cosine" | "cubic";
             rate?: number | null;
             over?: number | null;
             within?: number | null;
@@ -5269,7 +5365,7 @@ export interface components {
         /**
          * @description Reach ``to`` m/s: at a ``rate``, ``over`` seconds or ``within`` metres.
          *
-         *     None of the three is wanted for the shape ``step``. For ``cosine`` the rate is the largest.
+         *     None of the three is wanted for the shape ``step``. Of a curve the rate is the largest.
          */
         "SpeedChange-Output": {
             to: number;
@@ -5277,7 +5373,7 @@ export interface components {
              * @default linear
              * @enum {string}
              */
-            shape: "step" | "linear" | "cosine";
+            shape: "step" | "linear" | "cosine" | "cubic";
             rate: number | null;
             over: number | null;
             within: number | null;

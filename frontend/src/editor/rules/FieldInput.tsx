@@ -94,7 +94,7 @@ function PlainInput({ field, ...props }: FieldProps & { field: PlainField }) {
       return (
         <ChoiceInput
           label={label}
-          value={value}
+          value={value ?? field.otherwise}
           data={Object.entries(field.choices).map(([one, word]) => ({ value: one, label: word }))}
           optional={field.optional}
           onChange={(next) => set(next === "true" || next === "false" ? next === "true" : next)}

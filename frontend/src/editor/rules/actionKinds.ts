@@ -12,9 +12,10 @@ import {
   movement,
   movementText,
   number,
-  OVER,
   OWN,
   place,
+  SIDEWAYS,
+  sidewaysWords,
   speed,
   text,
   TO,
@@ -33,7 +34,12 @@ function side(by: unknown): string {
     : plural(lanes, { one: "# lane to the left", other: "# lanes to the left" });
 }
 
-const SHAPES = localized(() => ({ linear: t`Linear`, cosine: t`Cosine`, step: t`At once` }));
+const SHAPES = localized(() => ({
+  linear: t`Linear`,
+  cosine: t`Half-cosine`,
+  cubic: t`Cubic`,
+  step: t`At once`,
+}));
 const isStep = (values: Values): boolean => values.shape === "step";
 
 const LIGHTS = localized((): Record<string, string> => ({
@@ -78,9 +84,8 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   cut_in: {
     label: t`Cut in`,
     only: "vehicles",
-    fields: [TO(), OVER(), number("gap", t`Final gap`, " m", undefined, { min: 0.1 })],
-    words: (v) =>
-      t`cut in before ${text(v.to)} over ${amount(v.over, "s")}` + maybe(v.gap, t` with a gap of`, "m"),
+    fields: [TO(), ...SIDEWAYS(), number("gap", t`Final gap`, " m", undefined, { min: 0.1 })],
+    words: (v) => t`cut in before ${text(v.to)}` + sidewaysWords(v) + maybe(v.gap, t` with a gap of`, "m"),
   },
   lane: {
     label: t`Change lane`,
@@ -94,10 +99,13 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
           place("to", t`Lane to a place`),
         ],
       },
-      OVER(),
+      ...SIDEWAYS(),
+      number("offset", t`Then left of the lane's centre`, " m", undefined, { min: -10, max: 10, digits: 2 }),
     ],
     words: (v) =>
-      t`change ${given(v.to) ? t`to the lane to ${text(v.to)}` : side(v.by)} over ${amount(v.over, "s")}`,
+      t`change ${given(v.to) ? t`to the lane to ${text(v.to)}` : side(v.by)}` +
+      sidewaysWords(v) +
+      maybe(v.offset, t`, to an offset of`, "m"),
   },
   speed: {
     label: t`Reach a speed`,
@@ -122,7 +130,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
         : given(v.over)
           ? t`over ${amount(v.over, "s")}`
           : t`within ${amount(v.within, "m")}`;
-      return t`reach ${amount(v.to, "km/h", 3.6)} ${how}${v.shape === "cosine" ? t`, smoothly` : ""}`;
+      return t`reach ${amount(v.to, "km/h", 3.6)} ${how}${v.shape === "cosine" || v.shape === "cubic" ? t`, smoothly` : ""}`;
     },
   },
   brake: {
@@ -143,13 +151,17 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
   offset: {
     label: t`Move within the lane`,
     only: "vehicles",
-    fields: [number("to", t`Left of the lane's centre`, " m", 0.5, { min: -10, max: 10, digits: 2 }), OVER()],
+    fields: [
+      number("to", t`Left of the lane's centre`, " m", 0.5, { min: -10, max: 10, digits: 2 }),
+      ...SIDEWAYS(),
+    ],
     words: (v) => {
       const far = amount(typeof v.to === "number" ? Math.abs(v.to) : v.to, "m");
-      const over = amount(v.over, "s");
-      return typeof v.to === "number" && v.to < 0
-        ? t`move to ${far} right of the lane's centre over ${over}`
-        : t`move to ${far} left of the lane's centre over ${over}`;
+      return (
+        (typeof v.to === "number" && v.to < 0
+          ? t`move to ${far} right of the lane's centre`
+          : t`move to ${far} left of the lane's centre`) + sidewaysWords(v)
+      );
     },
   },
   keep_gap: {
@@ -167,6 +179,7 @@ export const ACTION_KINDS = localized((): Record<ActionKind, Kind> => ({
       },
       { is: "flag", name: "ahead", label: t`Ahead of it, not behind`, otherwise: false },
       number("rate", t`Acceleration at most`, " m/s²", 3, { min: 0.1, max: 100 }),
+      number("braking", t`Deceleration at most, if another`, " m/s²", undefined, { min: 0.1, max: 100 }),
       number("lasting", t`For`, " s", undefined, { min: 0.1 }),
       { is: "flag", name: "once", label: t`Only until it is reached`, otherwise: false },
     ],

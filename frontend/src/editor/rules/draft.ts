@@ -159,7 +159,7 @@ function startOf(field: PlainField, others: readonly string[]): unknown {
     case "actor":
       return field.optional ? undefined : (others[0] ?? "");
     case "choice":
-      return field.optional ? undefined : Object.keys(field.choices)[0];
+      return field.optional || field.otherwise ? undefined : Object.keys(field.choices)[0];
     case "points":
       return [];
     case "flag":

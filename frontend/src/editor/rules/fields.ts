@@ -32,7 +32,13 @@ export type PlainField =
   /** A place, light or movement, picked on the map or typed. */
   | (Named & { is: "place"; by: PickBy; hint: string })
   | (Named & { is: "rule" })
-  | (Named & { is: "choice"; choices: Readonly<Record<string, string>>; optional?: boolean })
+  /** `otherwise` is what holds where none is given. */
+  | (Named & {
+      is: "choice";
+      choices: Readonly<Record<string, string>>;
+      optional?: boolean;
+      otherwise?: string;
+    })
   | (Named & { is: "flag"; otherwise: boolean })
   /** Places in their order; with `timed` also the speeds or times at them. */
   | (Named & { is: "points"; timed: boolean })
@@ -119,7 +125,33 @@ export const OF = localized((): Field => ({
   optional: true,
 }));
 export const TO = localized((): Field => ({ is: "actor", name: "to", label: t`Other road user` }));
-export const OVER = localized(() => number("over", t`Duration`, " s", 3, { min: 0.1 }));
+
+/** How a vehicle moves to the side: for how long, or how far or fast, and on which line. */
+export const SIDEWAYS = localized((): readonly Field[] => [
+  {
+    is: "one",
+    label: t`How`,
+    of: [
+      number("over", t`In a time`, " s", 3, { min: 0.1 }),
+      number("within", t`In a distance`, " m", 40, { min: 0.1 }),
+      number("rate", t`At a lateral speed`, " m/s", 1, { min: 0.1, max: 100 }),
+    ],
+  },
+  {
+    is: "choice",
+    name: "shape",
+    label: t`Line`,
+    choices: { cosine: t`Half-cosine`, cubic: t`Cubic`, linear: t`Linear` },
+    otherwise: "cosine",
+  },
+]);
+/** " over 3 s", as {@link SIDEWAYS} has it. */
+export const sidewaysWords = (values: Values): string =>
+  given(values.within)
+    ? t` within ${amount(values.within, "m")}`
+    : given(values.rate)
+      ? t` at ${amount(values.rate, "m/s")}`
+      : t` over ${amount(values.over ?? 3, "s")}`;
 
 /** Of a kind that an installed package gives. */
 export const OWN = localized((): readonly Field[] => [

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from odscen.formats.openscenario.dialect import xml
 from odscen.formats.openscenario.xosc_signals import lamps_of, movement_of, signal_of
+from odscen.scenario.document.rules_document import CENTRES
 from odscen.scenario.document.scenario_document import LONGEST_AFTER_STORY
 
 if TYPE_CHECKING:
@@ -271,7 +272,14 @@ def _write_time(made: Triggers, leaf: Leaf) -> _Element:
     )
 
 
+def _note_points(made: Triggers, leaf: Leaf) -> None:
+    if leaf.part.behind != CENTRES:
+        words = "between centres, not points behind them"
+        made.notes.approximated.append((leaf.place, words))
+
+
 def _write_ttc(made: Triggers, leaf: Leaf) -> _Element:
+    _note_points(made, leaf)
     target = xml("TimeToCollisionConditionTarget", xml("EntityRef", entityRef=leaf.part.to))
     distance = made.dialect.distance("longitudinal")
     return xml(
@@ -280,6 +288,7 @@ def _write_ttc(made: Triggers, leaf: Leaf) -> _Element:
 
 
 def _write_headway(made: Triggers, leaf: Leaf) -> _Element:
+    _note_points(made, leaf)
     distance = made.dialect.distance("longitudinal")
     return xml(
         "TimeHeadwayCondition",
@@ -291,6 +300,7 @@ def _write_headway(made: Triggers, leaf: Leaf) -> _Element:
 
 
 def _write_distance(made: Triggers, leaf: Leaf) -> _Element:
+    _note_points(made, leaf)
     part, bound = leaf.part, made.bound(leaf)
     along_route = part.along == "lane"
     kind = {"straight": "cartesianDistance", "lane": "longitudinal"}.get(part.along, part.along)

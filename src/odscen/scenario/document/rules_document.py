@@ -10,7 +10,7 @@ and in docs/rules.md.
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
@@ -66,14 +66,23 @@ class PairBounded(OwnBounded):
     to: Identifier
 
 
+Behind = Annotated[float, Field(ge=-30, le=30, allow_inf_nan=False)]
+PointsBehind = tuple[Behind, Behind]
+"""Metres by which measured points lie behind the centres of two bodies: of the first, and of
+the other. The middle of a rear axle is one."""
+CENTRES: Final = (0.0, 0.0)
+
+
 class SecondsBetween(PairBounded):
     """Seconds between two actors; ``free`` measures between the bodies, not their centres.
 
     With ``ahead`` they are known only while ``to`` is ahead, as those of OpenSCENARIO's headway.
+    Without ``free`` the points measured between are ``behind`` metres behind the two centres.
     """
 
     free: bool = True
     ahead: bool = False
+    behind: PointsBehind = CENTRES
 
 
 class AfterTime(Part):
@@ -83,12 +92,16 @@ class AfterTime(Part):
 
 
 class DistanceBounded(OwnBounded):
-    """A distance to an actor or to a place; ``free`` measures between bodies, not their centres."""
+    """A distance to an actor or to a place; ``free`` measures between bodies, not their centres.
+
+    Without ``free`` the points measured between are ``behind`` metres behind the two centres.
+    """
 
     to: Identifier | None = None
     place: RulePlace | None = None
     along: Literal["straight", "longitudinal", "lateral", "lane"] = "straight"
     free: bool = True
+    behind: PointsBehind = CENTRES
 
     @model_validator(mode="after")
     def _one_end(self) -> Self:

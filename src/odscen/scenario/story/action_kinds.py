@@ -23,6 +23,7 @@ from odscen.scenario.story.motion_laws import (
     SpeedTable,
     beside,
     braking,
+    heading_on,
     line_length,
     point_on,
     speed_change,
@@ -81,7 +82,8 @@ def walk(part: Walking, acting_actor: ActingActor) -> float:
 def _along_line(line: tuple[Point, ...], speed: float | None, acting_actor: ActingActor) -> None:
     channel = acting_actor.channel
     usual = speed or acting_actor.view.walking_speed(acting_actor.actor.id)
-    if speed is not None or channel.law is None or channel.held or channel.borrowed:
+    waits = channel.held and channel.speed_owner is None
+    if speed is not None or channel.law is None or waits or channel.borrowed:
         # ... unless a rule has said how fast it goes
         channel.take_speed(steady(acting_actor.instant, usual), acting_actor.owner)
     channel.take_line(line, 0.0, None, acting_actor.owner, acting_actor.instant)
@@ -817,9 +819,30 @@ def _begin_stop(part: Stopping, acting_actor: ActingActor) -> float:
 
 def _finish_stop(_: Any, acting_actor: ActingActor) -> None:
     if acting_actor.actor.person:
+        _end_line_here(acting_actor)
         stay(acting_actor)
     else:
         acting_actor.channel.keep_speed()
+
+
+def _end_line_here(acting_actor: ActingActor) -> None:
+    """Cut off what is left of the line of a person, who is held at the end of it."""
+    channel, instant = acting_actor.channel, acting_actor.instant
+    line = channel.line or ()
+    along = channel.along + channel.metres(acting_actor.view.time, instant)
+    if channel.held or not 0.0 < along < line_length(line) - _SAME:
+        return
+    place, before, passed = point_on(line, along), 0.0, [line[0]]
+    for a, b in itertools.pairwise(line):
+        before += math.dist(a, b)
+        if before >= along:
+            break
+        passed.append(b)
+    cut = (*passed, (place.x, place.y))
+    headings = channel.headings
+    if headings is not None:
+        headings = (*headings[: len(passed)], heading_on(line, headings, along))
+    channel.take_line(cut, along, None, acting_actor.owner, instant, headings=headings)
 
 
 def _begin_go(_: Going, acting_actor: ActingActor) -> float:

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from odscen.scenario.story.road_view import ActorView, Point, RoadView
 
 
+_BEND = 5.0
+"""Metres before and behind a place of a line between which its curvature is taken."""
+_SLOWEST = 0.2
+"""Least pace on the ground over that along the line: inside a bend as tight as the offset."""
 _HALVINGS = 60
 
 
@@ -273,7 +277,7 @@ class Channel:
             if self.held:
                 self.along = line_length(self.line)
             else:
-                self.along += metres
+                self.along += metres * self._pace_along()
             pose = self._pose_at(time + step, person=person)
         speed = metres / step if self._forced else None
         if speed is None and self.law is not None:
@@ -293,6 +297,19 @@ class Channel:
         )
         self.rejoins, self.goal = False, None
         return move
+
+    def _pace_along(self) -> float:
+        """Metres of the line for each that the actor covers: beside a bend it is 1/(1 - k e).
+
+        k is the curvature of the line there, 1/m, positive to the left, and e the offset.
+        """
+        line, side = self.line or (), self.side
+        if side is None or len(line) < 3:
+            return 1.0
+        ahead, behind = (point_on(line, self.along + way * _BEND).hdg for way in (1.0, -1.0))
+        curvature = math.remainder(ahead - behind, math.tau) / (2.0 * _BEND)
+        left = side.offset(self._laws[0][0], self.along)
+        return 1.0 / max(1.0 - curvature * left, _SLOWEST)
 
     def centre_along(self, actor: ActorView) -> float:
         """Metres along the line at which the centre of an actor's body is."""

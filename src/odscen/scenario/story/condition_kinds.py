@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         OneActor,
         OwnBounded,
         PairBounded,
+        PointsBehind,
         Reaching,
         SecondsBetween,
         SignalShows,
@@ -192,10 +193,11 @@ class _LengthwiseGap(NamedTuple):
     behind: ActorView
 
 
-def _measure_lengthwise(one: ActorView, other: ActorView) -> _LengthwiseGap:
+def _measure_lengthwise(one: ActorView, other: ActorView, behind: PointsBehind) -> _LengthwiseGap:
     guide = other if one.person and not other.person else one
     c, s = math.cos(guide.hdg), math.sin(guide.hdg)
-    dx, dy = other.x - one.x, other.y - one.y
+    (x, y), (ox, oy) = _measured_point(one, behind[0]), _measured_point(other, behind[1])
+    dx, dy = ox - x, oy - y
     ahead, aside = dx * c + dy * s, dy * c - dx * s
     faster = one.speed * math.cos(one.hdg - guide.hdg) - other.speed * math.cos(
         other.hdg - guide.hdg
@@ -222,7 +224,7 @@ def _read_time(part: AfterTime, _: str, view: RoadView) -> Reading:
 def _read_ttc(part: SecondsBetween, actor: str, view: RoadView) -> Reading | None:
     if (both := _pair_of_condition(part, actor, view)) is None:
         return None
-    found = _measure_lengthwise(*both)
+    found = _measure_lengthwise(*both, part.behind)
     if part.ahead and found.behind is not both[0]:
         return Reading(math.inf, NEVER)
     return _read_seconds(part, _gap_of(part, found), found.closing)
@@ -231,7 +233,7 @@ def _read_ttc(part: SecondsBetween, actor: str, view: RoadView) -> Reading | Non
 def _read_headway(part: SecondsBetween, actor: str, view: RoadView) -> Reading | None:
     if (both := _pair_of_condition(part, actor, view)) is None:
         return None
-    found = _measure_lengthwise(*both)
+    found = _measure_lengthwise(*both, part.behind)
     if part.ahead and found.behind is not both[0]:
         return Reading(math.inf, NEVER)
     if part.above is not None and found.behind.speed <= _STILL:
@@ -278,9 +280,10 @@ def _to_actor(
 ) -> float | None:
     if part.along == "straight":
         if not part.free:
-            return math.dist(_centre_of(one), _centre_of(other))
+            points = _measured_point(one, part.behind[0]), _measured_point(other, part.behind[1])
+            return math.dist(*points)
         return _straight_distance(one, other, (part.below or 0.0) + (part.above or 0.0))
-    found = _measure_lengthwise(one, other)
+    found = _measure_lengthwise(one, other, part.behind)
     if part.along == "longitudinal":
         return max(found.gap, 0.0) if part.free else abs(found.ahead)
     if part.along == "lateral":
@@ -290,8 +293,11 @@ def _to_actor(
         return max(abs(found.aside) - half, 0.0) if part.free else abs(found.aside)
     if part.along == "lane":
         metres = view.lane_distance(one.id, other.id)
+        if metres is None:
+            return None
         half = (one.length + other.length) / 2.0
-        return metres if metres is None or not part.free else max(metres - half, 0.0)
+        shorter = half if part.free else part.behind[1] - part.behind[0]
+        return metres - shorter if not shorter else max(metres - shorter, 0.0)
     raise ValueError(f"unknown direction {part.along!r}")
 
 
@@ -304,7 +310,8 @@ def _straight_distance(one: ActorView, other: ActorView, bound: float) -> float:
 
 def _to_place(part: DistanceBounded, actor_view: ActorView, view: RoadView) -> float | None:
     place = view.place(part.place or "")
-    dx, dy = place[0] - actor_view.x, place[1] - actor_view.y
+    x, y = _measured_point(actor_view, part.behind[0])
+    dx, dy = place[0] - x, place[1] - y
     c, s = math.cos(actor_view.hdg), math.sin(actor_view.hdg)
     if part.along == "longitudinal":
         ahead = abs(dx * c + dy * s)
@@ -314,12 +321,21 @@ def _to_place(part: DistanceBounded, actor_view: ActorView, view: RoadView) -> f
         return max(aside - actor_view.width / 2.0, 0.0) if part.free else aside
     if part.along == "lane":
         metres = view.lane_distance(actor_view.id, part.place or "")
-        return (
-            metres
-            if metres is None or not part.free
-            else max(metres - actor_view.length / 2.0, 0.0)
-        )
+        if metres is None:
+            return None
+        shorter = actor_view.length / 2.0 if part.free else -part.behind[0]
+        return metres - shorter if not shorter else max(metres - shorter, 0.0)
     return point_distance(actor_view.corners, place) if part.free else math.hypot(dx, dy)
+
+
+def _measured_point(actor_view: ActorView, behind: float) -> Point:
+    """Point of a body so many metres behind its centre."""
+    if not behind:  # nearly always
+        return actor_view.x, actor_view.y
+    return (
+        actor_view.x - behind * math.cos(actor_view.hdg),
+        actor_view.y - behind * math.sin(actor_view.hdg),
+    )
 
 
 def _centre_of(actor_view: ActorView) -> Point:
@@ -405,19 +421,20 @@ CONDITIONS = {
         ),
         ConditionKind(
             "ttc", "time to collision of two actors: gap between the bodies (without `free` the "
-            "centres) along the heading, over the speed at which it closes; with `ahead` only "
-            "while `to` is ahead", "s", _EXTRAPOLATED, "TimeToCollisionCondition",
-            _MIRRORED, _read_ttc,
+            "centres, or points `behind` them) along the heading, over the speed at which it "
+            "closes; with `ahead` only while `to` is ahead", "s", _EXTRAPOLATED,
+            "TimeToCollisionCondition", _MIRRORED, _read_ttc,
         ),
         ConditionKind(
-            "headway", "time headway: gap between the bodies (without `free` the centres) along "
-            "the heading, over the speed of the one behind; none while it is stopped, with `ahead` "
-            "only while `to` is ahead", "s", _EXTRAPOLATED,
+            "headway", "time headway: gap between the bodies (without `free` the centres, or "
+            "points `behind` them) along the heading, over the speed of the one behind; none while "
+            "it is stopped, with `ahead` only while `to` is ahead", "s", _EXTRAPOLATED,
             "TimeHeadwayCondition", _MIRRORED, _read_headway,
         ),
         ConditionKind(
             "distance", "metres to an actor (`to`) or a place (`place`): `straight`, "
-            "`longitudinal`, `lateral` or along the `lane`; `free` is between the bodies",
+            "`longitudinal`, `lateral` or along the `lane`; `free` is between the bodies, "
+            "otherwise between centres, or points `behind` them",
             "m", _EXTRAPOLATED, "RelativeDistanceCondition, DistanceCondition", _MIRRORED,
             _read_distance,
         ),

@@ -24,6 +24,7 @@ from tests.sumo.story_case import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 STEPS = (pytest.param(0.05, marks=pytest.mark.slow), 0.1, pytest.param(0.5, marks=pytest.mark.slow))
@@ -78,6 +79,7 @@ def test_braking_at_6_from_20_stops_after_33_m_whatever_the_vehicle_type_allows(
         ({"to": 10.0, "within": 60.0}, 4.0, 60.0),
         ({"to": 10.0, "over": 3.0, "shape": "cosine"}, 3.0, 45.0),
         ({"to": 10.0, "rate": 4.0, "shape": "cosine"}, 2.5 * math.pi / 2, 37.5 * math.pi / 2),
+        ({"to": 10.0, "rate": 4.0, "shape": "cubic"}, 2.5 * 1.5, 37.5 * 1.5),
         ({"to": 24.0, "over": 2.0}, 2.0, 44.0),
         ({"to": 10.0, "shape": "step"}, 0.0, 0.0),
     ],
@@ -121,6 +123,66 @@ def test_a_lane_change_is_a_half_cosine_from_lane_to_lane(
     assert van.y == pytest.approx(wanted, abs=0.05)
     assert van.x == pytest.approx(van.x[0] + 20.0 * van.time, abs=0.05)
     assert np.abs(van.hdg).max() < 0.15
+
+
+SHARES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "linear": lambda x: x,
+    "cosine": lambda x: (1.0 - np.cos(np.pi * x)) / 2.0,
+    "cubic": lambda x: x**2 * (3.0 - 2.0 * x),
+}
+
+
+@pytest.mark.parametrize(
+    ("how", "seconds"),
+    [
+        ({"over": 3.0, "shape": "linear"}, 3.0),
+        ({"over": 3.0, "shape": "cubic"}, 3.0),
+        ({"within": 60.0, "shape": "cubic"}, 3.0),
+        ({"rate": 1.5, "shape": "linear"}, 3.75 / 1.5),
+        ({"rate": 1.5, "shape": "cubic"}, 1.5 * 3.75 / 1.5),
+        ({"rate": 1.5}, math.pi / 2.0 * 3.75 / 1.5),
+        ({}, 3.0),
+    ],
+)
+def test_a_lane_change_has_the_shape_and_the_measure_that_it_is_given(
+    tmp_path: Path, how: dict[str, Any], seconds: float
+) -> None:
+    actors = [fast("van", 370.0, RIGHT)]
+    rules = [after(1.23, {"lane": {"by": 1, **how}})]
+    found = run(document(MOTORWAY, actors, rules, until=7.0), tmp_path / "run")
+    van = found.tracks["van"]
+    share = np.clip((van.time - 1.23) / seconds, 0.0, 1.0)
+    wanted = RIGHT + (MIDDLE - RIGHT) * SHARES[how.get("shape", "cosine")](share)
+    assert van.y == pytest.approx(wanted, abs=0.05)
+    assert found.instant("r", "ended") == pytest.approx(1.23 + seconds, abs=0.01)
+
+
+def test_a_change_within_metres_heeds_the_speed_and_ends_beside_the_centre(tmp_path: Path) -> None:
+    actors = [fast("van", 370.0, RIGHT)]
+    change = {"lane": {"by": 1, "within": 60.0, "offset": 0.5}}
+    slow = {"speed": {"to": 10.0, "over": 2.0}}
+    rules = [after(1.0, {"together": [change, slow]})]
+    found = run(document(MOTORWAY, actors, rules, until=9.0), tmp_path / "run")
+    van = found.tracks["van"]
+    share = np.clip((van.x - van.x[0] - 20.0) / 60.0, 0.0, 1.0)
+    wanted = RIGHT + (MIDDLE + 0.5 - RIGHT) * (1.0 - np.cos(np.pi * share)) / 2.0
+    led = van.time < 6.0
+    assert van.y[led] == pytest.approx(wanted[led], abs=0.06)
+    # 30 m in the two seconds of braking, 30 m at 10 m/s
+    assert found.instant("r", "ended") == pytest.approx(1.0 + 2.0 + 3.0, abs=0.02)
+
+
+def test_a_gap_is_closed_with_its_rate_and_opened_with_its_braking(tmp_path: Path) -> None:
+    actors = [fast("ego", 430.0, MIDDLE, 15.0, ego=True), fast("van", 370.0, MIDDLE)]
+    gap = {"keep_gap": {"to": "ego", "metres": 15.0, "rate": 4.0, "braking": 1.5}}
+    rules = [
+        after(1.0, gap),
+        after(12.0, {"speed": {"to": 5.0, "rate": 3.0}}, name="brakes", actor="ego"),
+    ]
+    found = run(document(MOTORWAY, actors, rules, until=18.0), tmp_path / "run")
+    gained = np.diff(found.tracks["van"].speed) / np.diff(found.tracks["van"].time)
+    assert gained.min() == pytest.approx(-1.5, abs=0.05)
+    assert gained.max() <= 4.05
 
 
 @pytest.mark.slow
@@ -356,6 +418,34 @@ def test_a_walker_that_stops_on_the_road_stays_there_and_is_waited_for(tmp_path:
     assert child.centre(30.0) == pytest.approx((270.6, 103.4), abs=0.05)
     assert ego.speed[-1] < 0.5
     assert ego.x[-1] < 270.6 - 0.3
+
+
+def test_a_walker_who_is_stopped_on_its_line_stands_there_until_the_end(tmp_path: Path) -> None:
+    actors, rules, _ = crossing_child()
+    rules.append(after(0.0, {"stop": {}}, actor="child", name="halt"))
+    rules[-1]["when"] = {"rule": {"id": "run", "has": "started"}, "delay": 1.5}
+    found = run(document(TOWN, actors, rules, until=25.0), tmp_path / "run")
+    child, begins = found.tracks["child"], found.instant("run")
+    assert found.instant("halt") == pytest.approx(begins + 1.5, abs=1e-6)
+    start, there = child.centre(begins), child.centre(25.0)
+    assert math.dist(start, there) == pytest.approx(1.5 * 2.0, abs=0.05)
+    assert np.hypot(np.diff(child.x), np.diff(child.y)).max() < 0.25
+    # Its walk is not over: it was stopped.
+    assert [one.kind for one in found.events if one.rule == "run"] == [
+        "rule_started",
+        "rule_overridden",
+    ]
+
+
+def test_a_walker_who_has_waited_reaches_its_speed_as_the_rule_says(tmp_path: Path) -> None:
+    actors, rules, _ = crossing_child()
+    path = {"path": {"points": [[270.6, 103.4], [270.6, NORTH]]}}
+    rules[1]["then"] = [{"together": [{"speed": {"to": 3.0, "rate": 1.0}}, path]}]
+    found = run(document(TOWN, actors, rules, until=20.0), tmp_path / "run")
+    child, begins = found.tracks["child"], found.instant("run")
+    for seconds in (1.0, 2.0, 3.0):
+        covered = math.dist(child.centre(begins), child.centre(begins + seconds))
+        assert covered == pytest.approx(seconds**2 / 2.0, abs=0.05), seconds
 
 
 @pytest.mark.slow

@@ -396,10 +396,30 @@ def _read_abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Mad
         wanted += (
             entity.body.width + read.conditions.entities[kind.get("entityRef", "")].body.width
         ) / 2
-    to = min(max(positions.beside_lane(own) - left + side * wanted, -10.0), 10.0)
+    now = positions.beside_lane(own)
+    to = min(max(now - left + side * wanted, -10.0), 10.0)
     words = f"{to:.2f} m from its own lane, if the other one stays in the lane in which it starts"
     report.mark(kind, "approximated", words)
-    return {"offset": {"to": round(to, 3), "over": _USUAL}}
+    moves = abs(to - read.offsets.get(entity.id, now))
+    read.offsets[entity.id] = to
+    return {"offset": {"to": round(to, 3), "over": _read_limited_time(read, kind, moves)}}
+
+
+def _read_limited_time(read: ActionReader, kind: _Element, moves: float) -> float:
+    """Seconds of a half-cosine over ``moves`` metres that keeps to the constraints of an action.
+
+    Its greatest speed is pi de / (2 T), its greatest acceleration pi^2 de / (2 T^2).
+    """
+    report = read.conditions.report
+    limits = report.child(kind, "DynamicConstraints")
+    fastest = 0.0 if limits is None else report.number(limits, "maxSpeed", 0.0)
+    hardest = 0.0 if limits is None else report.number(limits, "maxAcceleration", 0.0)
+    seconds = [math.pi * moves / (2.0 * fastest)] if fastest > 0 else []
+    seconds += [math.pi * math.sqrt(moves / (2.0 * hardest))] if hardest > 0 else []
+    if limits is not None:
+        words = "on a half-cosine that keeps to its speed and acceleration to the side"
+        report.mark(limits, "approximated", words)
+    return float(max(round(max(seconds), 3), 0.1)) if seconds else _USUAL
 
 
 def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, float]:
@@ -443,7 +463,7 @@ def _read_gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
             part[name] = min(max(most, 0.1), 100.0)
         if part["braking"] == part["rate"]:
             del part["braking"]
-        words = "only the speed of the gap keeps to maxAcceleration and maxDeceleration"
+        words = "acceleration and deceleration keep to their limits, not how fast they change"
         for attribute in ("maxAccelerationRate", "maxDecelerationRate"):
             if limits.get(attribute) is not None:
                 report.mark(limits, "approximated", words)

@@ -317,15 +317,19 @@ def _read_headway(read: ConditionReader, kind: _Element, of: str) -> Made:
 
 
 def _read_pair(read: ConditionReader, kind: _Element, of: str, to: str) -> Made:
-    """Who is meant, and whether seconds are between bodies or, as here, their centres."""
+    """Who is meant, and whether seconds are between bodies or, as here, their reference points."""
     if kind.get("freespace") == "true":
         return {"of": of, "to": to}
-    entities = {one.id: one for one in read.entities.values()}
-    apart = abs(entities[to].ahead - entities[of].ahead) if {of, to} <= {*entities} else 0.0
-    if apart > _SAME_AXLE:
-        words = f"between centres, not reference points: up to {apart:.2f} m otherwise"
-        read.report.mark(kind, "approximated", words)
-    return {"of": of, "to": to, "free": False}
+    return {"of": of, "to": to, "free": False, **_reference_points(read, of, to)}
+
+
+def _reference_points(read: ConditionReader, of: str, to: str = "") -> Made:
+    """How far the reference points of entities lie behind their centres, where they do."""
+    if read.own:  # which writes distances of centres
+        return {}
+    ahead = {one.id: float(one.ahead) for one in read.entities.values()}
+    behind = [round(ahead.get(name, 0.0), 4) for name in (of, to)]
+    return {"behind": behind} if any(abs(metres) > _SAME_AXLE for metres in behind) else {}
 
 
 def _name_of_condition(kind: _Element) -> str:
@@ -341,25 +345,24 @@ def _read_ttc(read: ConditionReader, kind: _Element, of: str) -> Made:
     return read.bounded(kind, "ttc", _read_pair(read, kind, of, read.actor(other)))
 
 
-def _read_measure(read: ConditionReader, kind: _Element, usual: str) -> Made:
+def _read_measure(read: ConditionReader, kind: _Element, usual: str, of: str, to: str) -> Made:
     along = _ALONG.get(kind.get("relativeDistanceType", usual), "straight")
     if along == "longitudinal" and kind.get("coordinateSystem") in ("lane", "road"):
         along = "lane"
-    free = kind.get("freespace") == "true"
-    if not free:
-        read.report.mark(kind, "approximated", "between centres, not reference points")
-    return {"along": along, "free": free}
+    if kind.get("freespace") == "true":
+        return {"along": along, "free": True}
+    return {"along": along, "free": False, **_reference_points(read, of, to)}
 
 
 def _relative_distance(read: ConditionReader, kind: _Element, of: str) -> Made:
-    part = {"of": of, "to": read.actor(kind), **_read_measure(read, kind, "longitudinal")}
+    to = read.actor(kind)
+    part = {"of": of, "to": to, **_read_measure(read, kind, "longitudinal", of, to)}
     return read.bounded(kind, "distance", part)
 
 
 def _read_distance(read: ConditionReader, kind: _Element, of: str) -> Made:
-    centre = "" if kind.get("freespace") == "true" else of
-    place = read.place(kind, centre)
-    part = {"of": of, "place": place, **_read_measure(read, kind, "euclidianDistance")}
+    measure = _read_measure(read, kind, "euclidianDistance", of, "")
+    part = {"of": of, "place": read.place(kind, ""), **measure}
     if kind.get("alongRoute") == "true":
         part["along"] = "lane"
     return read.bounded(kind, "distance", part)

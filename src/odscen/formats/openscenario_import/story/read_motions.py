@@ -121,6 +121,9 @@ def _timed_points(
     times = [scale * vertex[0] + offset for vertex in vertices]
     if times[0] <= 0 or any(one >= other for one, other in itertools.pairwise(times)):
         raise RefusedError(timing, "times of vertices that do not grow")
+    if not conditions.own:
+        words = "at an even speed from time to time; a player may change it in between"
+        report.mark(timing, "approximated", words)
     return {"points": points, "times": times}
 
 

@@ -261,6 +261,9 @@ class StoryReader:
             self.report.mark(event, "approximated", "runs beside other events of its maneuver")
         when = joined("all", [conditions.trigger(trigger), conditions.trigger(own)])
         self._whens[event] = when
+        if not self.own and when == ALWAYS:
+            words = "begins with the run; a player that works in steps begins it a step later"
+            self.report.mark(event, "approximated", words)
         times = int(self.report.number(event, "maximumExecutionCount", 1.0))
         if not self.own:
             self._read_global_actions(event, when, times)

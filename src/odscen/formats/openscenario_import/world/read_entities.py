@@ -27,6 +27,9 @@ _LARGEST: Final = Body(30.0, 5.0, 10.0)
 _NEAREST: Final = {"semitrailer": Category.TRUCK, "trailer": Category.TRUCK}
 EGO: Final = re.compile(r"ego|hero|ego_vehicle|host|vut", re.IGNORECASE)
 
+_REFERENCE_POINT: Final = "refpoint_x_offset"
+"""Property of a vehicle: metres from its rear axle to the point that positions are of."""
+
 
 @dataclass(slots=True)
 class ReadEntity:
@@ -132,6 +135,10 @@ def _read_entity(report: ImportReport, thing: _Element, own: str) -> ReadEntity 
         centre, size = report.child(box, "Center"), report.child(box, "Dimensions")
         if centre is not None:
             ahead = report.number(centre, "x", 0.0)
+        # esmini's name for a vehicle whose places are those of another point than its rear axle.
+        for named in thing.iterfind(f"Properties/Property[@name='{_REFERENCE_POINT}']"):
+            ahead -= report.number(named, "value", 0.0)
+            report.take(named)
         if size is not None:
             body, sized = _read_size(report, size, body), True
     obstacle = thing.tag == "MiscObject"
