@@ -2,8 +2,8 @@
 
 ``python -m tools.container_steps`` lays out the build context as ``.dockerignore`` has it, carries
 out the steps of both stages with pip in an environment of its own, runs the demo, starts the page
-as the image does, asks it, and prints sizes. What concerns the system (packages of Debian, users)
-is left out; each such step is said.
+as the image does, asks it, runs the health check, and prints sizes. What concerns the system
+(packages of Debian, users) is left out; each such step is said.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import fnmatch
 import http.client
 import json
 import os
-import shlex
 import shutil
 import subprocess
 import sys
@@ -128,7 +127,8 @@ def _try_steps(folder: Path) -> None:
     command = json.loads(next(step.words for step in found if step.name == "CMD"))
     own |= {"ODSCEN_WORKSPACE": str(folder / "workspace"), "ODSCEN_TOKEN": TOKEN}
     subprocess.run([*entry, "demo", "--workspace", str(folder / "demo")], env=own, check=True)
-    _ask_page([str(venv / "bin" / entry[0]), *command, "--port", "0"], own)
+    health = next(step.words for step in found if step.name == "HEALTHCHECK")
+    _ask_page([str(venv / "bin" / entry[0]), *command, "--port", "0"], health, own)
 
 
 def _run_step(command: str, build: Path, own: dict[str, str]) -> None:
@@ -138,23 +138,37 @@ def _run_step(command: str, build: Path, own: dict[str, str]) -> None:
     print(f"{time.monotonic() - began:.0f} s: {command}")
 
 
-def _ask_page(command: list[str], own: dict[str, str]) -> None:
-    """Start the page as the image does, and see who is let in."""
+def _ask_page(command: list[str], health: str, own: dict[str, str]) -> None:
+    """Start the page as the image does, see who is let in, and stop it as an engine does."""
     with subprocess.Popen(command, env=own, stderr=subprocess.PIPE, text=True) as server:
         try:
             line = "" if server.stderr is None else server.stderr.readline()
             port = int(line.split("127.0.0.1:")[1].split("/")[0])
-            for heads, wanted in (({}, 401), ({"Authorization": f"Bearer {TOKEN}"}, 200)):
-                connection = http.client.HTTPConnection("127.0.0.1", port, timeout=_PATIENCE)
-                connection.request("GET", "/api/maps", headers=heads)
-                status = connection.getresponse().status
-                if status != wanted:
-                    sys.exit(
-                        f"/api/maps is answered with {status}, not {wanted}: {shlex.join(command)}"
-                    )
-            print("the page is there, and asks for its token")
+            key = {"Authorization": f"Bearer {TOKEN}"}
+            for path, heads, wanted, words in (
+                ("/", {}, 401, ""),
+                ("/", key, 200, "<!doctype html>"),
+                ("/api/maps", {}, 401, ""),
+                ("/api/maps", key, 200, "["),
+            ):
+                status, text = _ask(port, path, heads)
+                if status != wanted or not text.lower().startswith(words):
+                    sys.exit(f"{path} is answered with {status}, not {wanted}: {text[:200]}")
+                print(f"{path} {'with' if heads else 'without'} its token: {status}, {len(text)} B")
+            look = json.loads(health[health.index("[") :])
+            look[-1] = look[-1].replace("8420", str(port))
+            subprocess.run(look, env=own, check=True)
+            print("the health check finds the page")
         finally:
             server.terminate()
+    print(f"stopped with {server.returncode}")
+
+
+def _ask(port: int, path: str, heads: dict[str, str]) -> tuple[int, str]:
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=_PATIENCE)
+    connection.request("GET", path, headers=heads)
+    answer = connection.getresponse()
+    return answer.status, answer.read().decode("utf-8", "replace")
 
 
 def _size_of(folder: Path) -> float:
