@@ -9,11 +9,11 @@ import {
 import { t } from "@lingui/core/macro";
 import { useLingui } from "@lingui/react";
 import { Trans } from "@lingui/react/macro";
-import { lazy, Suspense, useEffect } from "react";
+import { lazy, Suspense, useEffect, useRef } from "react";
 
 import { noteViewShown } from "./language/load";
 import { PreferencesButton } from "./language/PreferencesButton";
-import { usePreferences } from "./language/preferences";
+import { chosenHere, usePreferences } from "./language/preferences";
 import { IconMoon, IconSun } from "./ui/icons";
 import { NoticeList } from "./ui/notices";
 import { hashOf, useAddress } from "./ui/address";
@@ -42,6 +42,14 @@ function ViewShown() {
   return null;
 }
 
+/** A key that changes with the preferences when they were chosen in this tab. */
+function useAnew(preferred: string): number {
+  const last = useRef({ preferred, key: 0 });
+  if (last.current.preferred !== preferred)
+    last.current = { preferred, key: last.current.key + (chosenHere() ? 1 : 0) };
+  return last.current.key;
+}
+
 /** One window: catalogue, editor and run. */
 export function App() {
   const address = useAddress();
@@ -49,6 +57,7 @@ export function App() {
   const { setColorScheme } = useMantineColorScheme();
   const { i18n } = useLingui();
   const { speed, length, hours } = usePreferences();
+  const anew = useAnew(`${i18n.locale} ${speed} ${length} ${hours}`);
   const dark = useComputedColorScheme("light") === "dark";
   const toggle = dark ? t`Use light colours` : t`Use dark colours`;
   return (
@@ -170,10 +179,7 @@ export function App() {
       </header>
       <main id="main" tabIndex={-1} className="main">
         {/* A view begins anew in another language or unit; what it had is saved. */}
-        <Suspense
-          key={`${i18n.locale} ${speed} ${length} ${hours}`}
-          fallback={<Loader m="xl" aria-label={t`Loading the page`} />}
-        >
+        <Suspense key={anew} fallback={<Loader m="xl" aria-label={t`Loading the page`} />}>
           <ViewShown />
           {address.view === "catalogue" && <CatalogueView />}
           {address.view === "editor" && <EditorView key={address.scenario} scenario={address.scenario} />}

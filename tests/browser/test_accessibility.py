@@ -1,4 +1,5 @@
-"""axe finds nothing in any view, light and dark, wide and narrow; the keyboard reaches all.
+"""axe finds nothing in any view, in both languages, light and dark, wide and narrow; the keyboard
+reaches all.
 
 No text is cut off, at 200 % of its size neither. A picture of each view is kept under
 build/browser/views.
@@ -45,6 +46,15 @@ SIZES = {"1440": (1440, 900), "1024": (1024, 768), "390": (390, 844), "zoomed": 
 """Pixels of the windows in which each view is looked at; the last is the first at 200 %."""
 
 
+LANGUAGES = ("en", "de")
+PREFER = """language => {
+    const [key, newValue] = ["odscen.preferences", JSON.stringify({language})];
+    localStorage.setItem(key, newValue);
+    dispatchEvent(new StorageEvent("storage", {key, newValue}));
+}"""
+"""What the page sees when another tab chooses a language."""
+
+
 class Inspector:
     """Looks at one view after the other and collects what is wrong."""
 
@@ -54,13 +64,28 @@ class Inspector:
         self.wrong = Wrongs()
 
     def look(self, view: str) -> None:
-        """Look at what is shown now in a window of each size."""
+        """Look at what is shown now in a window of each size, in each language if it has both."""
         usual = self.page.viewport_size
         assert usual is not None
+        first, *others = LANGUAGES if self.page.url.startswith("http") else ("en",)
+        self._look_at_sizes(f"{view}-{first}")
+        for language in others:
+            self._prefer(language)
+            self._look_at_sizes(f"{view}-{language}")
+        self.page.set_viewport_size(usual)
+        if others:
+            self._prefer(first)
+
+    def _prefer(self, language: str) -> None:
+        self.page.evaluate(PREFER, language)
+        self.page.wait_for_function(
+            "wanted => document.documentElement.lang === wanted", arg=language
+        )
+
+    def _look_at_sizes(self, view: str) -> None:
         for size, (width, height) in SIZES.items():
             self.page.set_viewport_size({"width": width, "height": height})
             self._look(f"{view}-{size}")
-        self.page.set_viewport_size(usual)
 
     def _look(self, view: str) -> None:
         settle(self.page)

@@ -1,5 +1,6 @@
 import { Button, Loader, Text } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
+import { useLingui } from "@lingui/react";
 import { Trans } from "@lingui/react/macro";
 import { memo, useMemo, useState } from "react";
 
@@ -83,6 +84,8 @@ export const EditorSteps = memo(
 );
 
 function AllSteps({ store, now, drawing, assets, choices, hindrance, starting, onRun }: Props) {
+  // Drawn anew with another language.
+  useLingui();
   const {
     scenario: { name, version },
     document,

@@ -1,5 +1,6 @@
 import { ActionIcon, Button, Menu, Tooltip } from "@mantine/core";
 import { t } from "@lingui/core/macro";
+import { useLingui } from "@lingui/react";
 import { Trans } from "@lingui/react/macro";
 import { memo, useEffect, useRef, useState } from "react";
 import { createPortal } from "react-dom";
@@ -46,6 +47,8 @@ export const HeadTools = memo(function HeadTools({
   onPicture: () => HTMLCanvasElement | null;
   onVector: () => string | null;
 }) {
+  // Drawn anew with another language.
+  useLingui();
   const { scenario, checked, saving, undo, redo, name, edit } = store();
   const [slot, setSlot] = useState<HTMLElement | null>(null);
   const [dialog, setDialog] = useState<Dialog>(null);

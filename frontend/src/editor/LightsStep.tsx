@@ -67,12 +67,9 @@ export function LightsStep({
             <Button
               key={value}
               size="compact-sm"
-              h="auto"
-              mih={26}
-              py={3}
+              className="wrapping"
               variant={value === shown ? "filled" : "default"}
               aria-pressed={value === shown}
-              styles={{ label: { whiteSpace: "normal", textAlign: "start" } }}
               onClick={() => onShow(value)}
             >
               {label}

@@ -1,5 +1,6 @@
 import { ActionIcon, Button, TextInput } from "@mantine/core";
 import { plural, t } from "@lingui/core/macro";
+import { useLingui } from "@lingui/react";
 import { Trans } from "@lingui/react/macro";
 import { type KeyboardEvent, memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 
@@ -55,6 +56,8 @@ export const RoadUserTable = memo(function RoadUserTable({
   onSelectAll: (ids: string[]) => void;
   onRemove: (ids: readonly string[]) => void;
 }) {
+  // Drawn anew with another language.
+  useLingui();
   const [filter, setFilter] = useState("");
   const [scroll, setScroll] = useState({ top: 0, height: 300 });
   const searching = ones.length > MANY;
@@ -232,6 +235,8 @@ const Cells = memo(function Cells({
   chosen: boolean;
   actions: RowActions;
 }) {
+  // Drawn anew with another language.
+  useLingui();
   return (
     <>
       <td>

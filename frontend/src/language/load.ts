@@ -1,7 +1,7 @@
 import { i18n, type Messages } from "@lingui/core";
 import { compileMessage } from "@lingui/message-utils/compileMessage";
 
-import { type Language, LANGUAGES, usePreferences } from "./preferences";
+import { followOtherTabs, type Language, LANGUAGES, usePreferences } from "./preferences";
 import { serveSentences, serveTexts } from "./served";
 
 /** The catalogues, each loaded when its language is first chosen; English texts come with the code. */
@@ -69,6 +69,7 @@ export async function startSpeaking(): Promise<void> {
   usePreferences.subscribe(({ language }, before) => {
     if (language !== before.language) void speak(language);
   });
+  followOtherTabs();
   await speak(usePreferences.getState().language);
 }
 

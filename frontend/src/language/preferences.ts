@@ -54,12 +54,26 @@ export const usePreferences = create<Preferences>(() => read(remembered(), navig
 /** The preferences now, for what is no component. */
 export const preferences = (): Preferences => usePreferences.getState();
 
+let chosen = true;
+/** Whether they were last changed in this tab, which then begins anew; else it keeps what is open in it. */
+export const chosenHere = (): boolean => chosen;
+
 /** Changes some of them, and remembers them where the browser lets. */
 export function prefer(changed: Partial<Preferences>): void {
+  chosen = true;
   usePreferences.setState(changed);
   try {
     localStorage.setItem(KEY, JSON.stringify(preferences()));
   } catch {
     // They hold until the page is closed.
   }
+}
+
+/** Takes over what another tab of this browser prefers, as soon as it does. */
+export function followOtherTabs(): void {
+  addEventListener("storage", ({ key, newValue }) => {
+    if (key !== KEY) return;
+    chosen = false;
+    usePreferences.setState(read(newValue, navigator.languages));
+  });
 }

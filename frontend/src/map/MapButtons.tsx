@@ -1,5 +1,6 @@
 import { ActionIcon, Checkbox, Popover, Slider, Stack, Text, Tooltip } from "@mantine/core";
 import { t } from "@lingui/core/macro";
+import { useLingui } from "@lingui/react";
 import { Trans } from "@lingui/react/macro";
 import { memo, type ReactNode } from "react";
 
@@ -34,6 +35,8 @@ export const MapButtons = memo(function MapButtons({
   /** Whether a picture lies under the map. */
   pictured: boolean;
 }) {
+  // Drawn anew with another language.
+  useLingui();
   return (
     <div className="map-buttons">
       <LayersButton pictured={pictured} />

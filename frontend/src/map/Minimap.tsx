@@ -1,4 +1,5 @@
 import { memo, useEffect, useMemo, useRef } from "react";
+import { useLingui } from "@lingui/react";
 
 import type { Bounds } from "../api/types";
 import type { MapRenderer } from "./renderer";
@@ -17,6 +18,8 @@ const LONG = 150;
 
 /** The whole map, small, with a frame around what is seen; press or drag to go there. */
 export const Minimap = memo(function Minimap({ renderer, bounds, view, size, dark, onMove }: Props) {
+  // Drawn anew with another language.
+  useLingui();
   const canvas = useRef<HTMLCanvasElement>(null);
   const held = useRef(false);
   const box = useMemo<Size>(() => {
