@@ -13,10 +13,10 @@ runs with all lights off and bare maps.
 Collisions are counted inside junctions, too.
 
 With lights as programmed and with all of them off. netconvert does not read stop and yield signs,
-nor most speed limits; who stops, or slows down from 100 km/h, has delay that one who need not has
-not. So maps with such signs or limits are measured once more without them ("bare"), by both, and
-have a third network, netconvert's with the map's limits and stop signs
-(:mod:`bench.same_limits`).
+nor most speed limits, and lets cars corner with 5.5 m/s2; who stops, or slows down from 100 km/h or
+for a turn, has delay that one who need not has not. So there is a third network, netconvert's with
+the map's limits and stop signs and the speeds of odscen's turns (:mod:`bench.same_limits`), and
+maps with such signs or limits are measured once more without them ("bare").
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def main() -> None:
         return
     levels = [int(v) for v in os.environ.get("ODSCEN_BENCH_LEVELS", "100,300,500").split(",")]
     seeds = [int(v) for v in os.environ.get("ODSCEN_BENCH_SEEDS", "1,2").split(",")]
-    print("ours / netconvert's / netconvert's with limits and stop signs, where the map has them")
+    print("ours / netconvert's / netconvert's with the same limits, stop signs and speeds in turns")
     print(
         "| map | lights | per hour and km | arrived | delay, s | trip, s | teleports | collisions |"
     )
@@ -94,9 +94,8 @@ def main() -> None:
             path = name if isinstance(name, Path) else _made_map(name, Path(folder))
             versions = _versions(path, Path(folder))
             for file, label in versions[: 1 if ONLY_ON else None]:
-                ruled = len(versions) > 1 and file == path
                 try:
-                    bench = _MapBench(file, Path(folder), label, places=path, ruled=ruled)
+                    bench = _MapBench(file, Path(folder), label, places=path)
                 except subprocess.CalledProcessError:
                     print(f"| {label} | | | netconvert cannot read it |")
                     break
@@ -105,7 +104,7 @@ def main() -> None:
                 for level in HIGH_LEVELS.get(path.stem, levels):
                     ratios += bench.measure(level, seeds)
     if ratios:
-        print(f"median ratio of delays {statistics.median(ratios):.2f}")
+        print(f"median ratio of delays, of the same limits {statistics.median(ratios):.2f}")
 
 
 def _versions(path: Path, folder: Path) -> list[tuple[Path, str]]:
@@ -161,9 +160,9 @@ def _maps() -> list[Path | str]:
 
 
 class _MapBench:
-    """One map with its networks; ``ruled``: it has limits or signs that netconvert leaves out."""
+    """One map with its networks."""
 
-    def __init__(self, path: Path, folder: Path, label: str, *, places: Path, ruled: bool) -> None:
+    def __init__(self, path: Path, folder: Path, label: str, *, places: Path) -> None:
         import carla
         import sumolib
 
@@ -174,13 +173,12 @@ class _MapBench:
         left = ["--lefthand"] if 'rule="LHT"' in text else []
         _tool("netconvert", "--opendrive-files", path, "-o", self._files["netconvert"],
               "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
-        if ruled:
-            limited, net = folder / "limited.xodr", folder / "limited.net.xml"
-            map_with_limits(path, limited)
-            _tool("netconvert", "--opendrive-files", limited, "-o", net,
-                  "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
-            add_signs_and_inner_limits(path, self._files["ours"], net)
-            self._files["limited"] = net
+        limited, net = folder / "limited.xodr", folder / "limited.net.xml"
+        map_with_limits(path, limited)
+        _tool("netconvert", "--opendrive-files", limited, "-o", net,
+              "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
+        add_signs_and_inner_limits(path, self._files["ours"], net)
+        self._files["limited"] = net
         text = places.read_text(encoding="utf-8", errors="replace")
         lengths = {r.get("id"): float(r.get("length", 0)) for r in ET.fromstring(text).iter("road")}
         self._waypoints = [
@@ -195,7 +193,7 @@ class _MapBench:
         self._known: dict[int, dict[str, _Place] | None] = {}
 
     def measure(self, level: int, seeds: Sequence[int]) -> list[float]:
-        """Print a row with lights and one without; ratios of the delays."""
+        """Print a row with lights and one without; ratios of the delays, of the same limits."""
         departs = self._trips(max(20, int(level * self.kilometres)))
         lit = bool(
             self._nets["ours"].getTrafficLights() or self._nets["netconvert"].getTrafficLights()
@@ -212,7 +210,7 @@ class _MapBench:
                 for digits, some in zip(DIGITS, zip(*outcomes, strict=True), strict=True)
             ]
             print(f"| {self._label} | {lights} | {level} | {' | '.join(values)} |", flush=True)
-            ratios.append(outcomes[0].delay / max(outcomes[1].delay, 0.1))
+            ratios.append(outcomes[0].delay / max(outcomes[-1].delay, 0.1))
         return ratios
 
     def _trips(self, count: int) -> dict[str, float]:

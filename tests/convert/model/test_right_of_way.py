@@ -168,12 +168,16 @@ def test_a_ramp_gives_way_to_an_equally_fast_road_with_traffic_in_both_direction
         shape=road.shape + np.array([0.0, 3.5, 0.0]),
     )
     against = movement(EAST + math.pi, EAST + math.pi)
-    against = replace(against, shape=against.shape + np.array([0.0, 12.0, 0.0]))
+    against = replace(against, shape=against.shape + np.array([0.0, 7.0, 0.0]))
     listed = [road, beside, movement(0.4, EAST), against]
     found = find_conflicts(listed, [])
     assert making_room(listed, found, Rules()) == {(2, 0)}
     rights = requests(listed, found, Rules())
     assert [right.yields_to for right in rights[:3]] == [frozenset(), frozenset(), {0}]
+    # Beyond a median it is a motorway, which makes room though one junction has both directions.
+    beyond = replace(against, shape=against.shape + np.array([0.0, 5.0, 0.0]))
+    listed[3] = beyond
+    assert making_room(listed, find_conflicts(listed, []), Rules()) == {(0, 2)}
 
 
 def test_without_a_sign_one_sees_others_from_where_one_can_stop_for_them_in_comfort() -> None:

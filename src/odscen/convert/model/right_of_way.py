@@ -55,6 +55,12 @@ OPPOSING = math.radians(125.0)
 _FASTER = 2.0
 """m/s by which a road must be faster to go first where lanes merge."""
 
+_MEDIAN = 6.0
+"""Metres between the lanes of both directions from which on each is a carriageway of its own.
+
+More than a lane for turns between them takes.
+"""
+
 _BESIDE = math.radians(75.0)
 """Difference of headings up to which two roads run into each other rather than meet."""
 
@@ -277,9 +283,18 @@ def making_room(
 
 
 def _is_two_way(movements: Sequence[Movement], number: int) -> bool:
-    """Whether other traffic comes the opposite way."""
-    heading = movements[number].heading_in
-    return any(abs(wrapped(other.heading_in - heading)) > OPPOSING for other in movements)
+    """Whether traffic comes the opposite way on the same carriageway: no median is between."""
+    main = movements[number]
+    s, c = math.sin(main.heading_in), math.cos(main.heading_in)
+    own = [one for one in movements if one.source[0] == main.source[0]]
+    return any(
+        abs(wrapped(other.heading_in - main.heading_in)) > OPPOSING
+        # Where one drives in, the other one comes out.
+        and abs((y - one.shape[0, 1]) * c - (x - one.shape[0, 0]) * s) - one.width < _MEDIAN
+        for other in movements
+        for x, y in (other.shape[-1, :2].tolist(),)
+        for one in own
+    )
 
 
 def _has_lane_beside(movements: Sequence[Movement], number: int) -> bool:
