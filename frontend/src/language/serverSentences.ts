@@ -599,6 +599,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "flow {name} is drawn by SUMO: its road users are in the run, and in figures by place, but not in the list of road users" }),
   msg({ message: "fog is everywhere" }),
   msg({ message: "followed from where the actor is" }),
+  msg({ message: "followed from where the walker is, who stays at its end" }),
   msg({ message: "footways only" }),
   msg({ message: "format" }),
   msg({ message: "format {format}" }),

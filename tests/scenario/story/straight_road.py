@@ -36,7 +36,7 @@ class Road:
     def leapt(self, name: str) -> bool:
         now, self.time = self.actor(name), self.time - self.step
         before, self.time = self.actor(name), self.time + self.step
-        return before is not None and now is not None and leapt(before, now)
+        return before is not None and now is not None and leapt(before, now, self.step)
 
     def actor(self, name: str) -> ActorView | None:
         one = next((one for one in self.actors if one.id == name), None)

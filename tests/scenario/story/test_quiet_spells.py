@@ -149,10 +149,12 @@ def test_who_follows_a_bend_does_not_leap_and_who_changes_lanes_does() -> None:
     bend = replace(
         CAR, x=radius * math.sin(turn), y=radius * (1.0 - math.cos(turn)), hdg=turn, speed=7.0
     )
-    assert not leapt(CAR, bend)
+    assert not leapt(CAR, bend, 0.1)
     aside = replace(bend, x=bend.x - 3.2 * math.sin(turn), y=bend.y + 3.2 * math.cos(turn))
-    assert leapt(CAR, aside)
-    assert leapt(LastPose(0.0, 0.0, math.pi), replace(CAR, x=-7.0, y=3.2, hdg=-math.pi))
+    assert leapt(CAR, aside, 0.1)
+    assert leapt(CAR, replace(CAR, speed=CAR.speed + 4.0), 0.1)
+    assert not leapt(CAR, replace(CAR, speed=CAR.speed + 4.0), 1.0)
+    assert leapt(LastPose(0.0, 0.0, math.pi), replace(CAR, x=-7.0, y=3.2, hdg=-math.pi), 0.1)
 
 
 def test_who_stays_on_a_bound_is_met_there_whatever_was_before() -> None:

@@ -15,16 +15,19 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 MOST_GAIN = 10.0
 """m/s²; what SUMO drives accelerates less."""
+_LEAP = 30.0
+"""m/s²; nobody gains or brakes so hard but in a step of the speed."""
 _ASIDE = 1.0
 """Metres that nobody comes aside of where he looks in one step, but by a change of lanes."""
 
 
 class LastPose(NamedTuple):
-    """Where an actor was: centre of the body, and where it looked."""
+    """Where an actor was: centre of the body, where it looked, and its speed, m/s, if known."""
 
     x: float
     y: float
     hdg: float
+    speed: float | None = None
 
 
 @dataclass(slots=True)  # not frozen: many are made in each step, and that takes three times as long
@@ -82,11 +85,14 @@ class ActorView:
         )
 
 
-def leapt(before: ActorView | LastPose, now: ActorView) -> bool:
-    """Whether an actor was put aside between two steps, as SUMO changes lanes within one.
+def leapt(before: ActorView | LastPose, now: ActorView, step: float) -> bool:
+    """Whether an actor was put aside between two steps, or given another speed at once.
 
-    Who follows a bend comes in the middle between where he looked and where he looks.
+    SUMO changes lanes within one step, and rules speeds. Who follows a bend comes in the middle
+    between where he looked and where he looks.
     """
+    if before.speed is not None and abs(now.speed - before.speed) > _LEAP * step:
+        return True
     hdg = before.hdg + math.remainder(now.hdg - before.hdg, math.tau) / 2.0
     aside = (now.y - before.y) * math.cos(hdg) - (now.x - before.x) * math.sin(hdg)
     return abs(aside) > _ASIDE
@@ -106,7 +112,7 @@ class RoadView(Protocol):
         """Whether an actor has left the road for good."""
 
     def leapt(self, name: str) -> bool:
-        """Whether an actor who was there a step before has been put aside since, :func:`leapt`."""
+        """Whether an actor who was there a step before has leapt since, :func:`leapt`."""
 
     def named(self) -> Sequence[ActorView]:
         """All actors on the road that rules name."""

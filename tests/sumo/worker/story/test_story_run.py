@@ -157,6 +157,22 @@ def test_a_lane_change_has_the_shape_and_the_measure_that_it_is_given(
     assert found.instant("r", "ended") == pytest.approx(1.23 + seconds, abs=0.01)
 
 
+def test_a_speed_that_is_set_at_once_is_not_drawn_out_into_a_headway(tmp_path: Path) -> None:
+    """30 m behind one at 10 m/s it is set from 10 to 20 m/s: below a second 10 m later."""
+    actors = [
+        fast("ego", 430.0, MIDDLE, 10.0, ego=True),
+        fast("van", 395.0, MIDDLE, 10.0, driver="story"),
+    ]
+    near = {"id": "near", "actor": "van", "when": {"headway": {"to": "ego", "below": 1.0}},
+            "then": [{"speed": {"to": 10.0, "shape": "step"}}]}  # fmt: skip
+    rules = [after(1.0, {"speed": {"to": 20.0, "shape": "step"}}), near]
+    found = run(document(MOTORWAY, actors, rules, until=6.0), tmp_path / "run")
+    ego, van = found.tracks["ego"], found.tracks["van"]
+    free = float(np.interp(1.0, ego.time, ego.x) - ego.length - np.interp(1.0, van.time, van.x))
+    assert 20.0 < free < 40.0  # a rule of odscen's own sees it within a step of the leap
+    assert found.instant("near") == pytest.approx(1.0 + (free - 20.0) / 10.0, abs=0.02)
+
+
 def test_a_change_within_metres_heeds_the_speed_and_ends_beside_the_centre(tmp_path: Path) -> None:
     actors = [fast("van", 370.0, RIGHT)]
     change = {"lane": {"by": 1, "within": 60.0, "offset": 0.5}}

@@ -93,7 +93,9 @@ def followed(conditions: ConditionReader, kind: _Element, entity: ReadEntity) ->
         for point in found
         for at in (point.at.moved(-ahead if how.backwards else ahead),)
     ]
-    report.mark(kind, "approximated", "followed from where the actor is")
+    walks = entity.category is Category.PEDESTRIAN
+    words = "followed from where the walker is, who stays at its end"
+    report.mark(kind, "approximated", words if walks else "followed from where the actor is")
     path = _timed_points(conditions, kind, vertices[1:])
     path |= {} if base is None else {"relative_to": entities[base].id}
     path |= {"behind": round(how.behind, 4)} if how.behind else {}

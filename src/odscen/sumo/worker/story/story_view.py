@@ -127,9 +127,9 @@ class StoryView:
         )
 
     def leapt(self, name: str) -> bool:
-        """Whether an actor who was read a step before has been put aside since."""
+        """Whether an actor who was read a step before has leapt since."""
         before, now = self._before.get(name), self.actor(name)
-        return before is not None and now is not None and leapt(before, now)
+        return before is not None and now is not None and leapt(before, now, self._step)
 
     def gone(self, name: str) -> bool:
         """Whether an actor has left the road for good."""
@@ -220,7 +220,9 @@ class StoryView:
             "standing": self._standing,
             "gone": sorted(self._gone),
             "last": {name: list(one) for name, one in self._last.items()},
-            "seen": {n: [one.x, one.y, one.hdg] for n, one in self._views.items() if one},
+            "seen": {
+                n: [one.x, one.y, one.hdg, one.speed] for n, one in self._views.items() if one
+            },
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
