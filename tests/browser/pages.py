@@ -337,7 +337,7 @@ class OdscenPage:
 
     def wait_until_moving(self) -> None:
         """The first picture after the start is there."""
-        expect(self.figure("Time").first).not_to_have_text("0:00.0")
+        expect(self.figure("Time").first).not_to_have_text("0:00.0", timeout=20_000)
 
     @property
     def result(self) -> Locator:
