@@ -24,6 +24,7 @@ from odscen.formats.openscenario.xosc_signals import (
 )
 from odscen.formats.openscenario.xosc_triggers import CannotSayError
 from odscen.scenario.document.rules_document import USUAL_MOVE
+from odscen.scenario.story.motion_laws import SHARPEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -181,8 +182,7 @@ def _write_offset(made: Actions, part: Any, actor: str, where: str) -> list[_Ele
         return [_lane_change(part, own, float(part.to))]
     made.notes.approximated.append((where, "an offset has no duration but an acceleration"))
     seconds = part.over or USUAL_MOVE
-    # Greatest |e''| of a half-cosine and of a cubic.
-    greatest = (math.pi**2 / 2.0 if part.shape == "cosine" else 6.0) * moves / seconds**2
+    greatest = SHARPEST[part.shape] * moves / seconds**2
     dynamics = xml(
         "LaneOffsetActionDynamics",
         dynamicsShape=_SHAPES[part.shape],

@@ -273,7 +273,8 @@ def _write_time(made: Triggers, leaf: Leaf) -> _Element:
 
 
 def _note_points(made: Triggers, leaf: Leaf) -> None:
-    if leaf.part.behind != CENTRES:
+    """Say that a condition is measured between centres, where it is between other points here."""
+    if not leaf.part.free and leaf.part.behind != CENTRES:
         words = "between centres, not points behind them"
         made.notes.approximated.append((leaf.place, words))
 

@@ -55,6 +55,11 @@ def _share_summed(shape: str, x: float) -> float:
 
 STEEPEST = {"linear": 1.0, "cosine": math.pi / 2.0, "cubic": 1.5}
 """How much faster than in an even change it changes at most, by shape."""
+SHARPEST = {"linear": 6.0, "cosine": math.pi**2 / 2.0, "cubic": 6.0}
+"""Largest acceleration of a change, in its whole over the square of its time.
+
+That of an even change is infinite where it begins and ends; it is taken to last as long as a cubic.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,18 +225,19 @@ class SideLaw:
 
     def offset(self, instant: float, along: float) -> float:
         """Metres to the left of the line at an instant, ``along`` metres of it."""
-        share = min(1.0, max(0.0, self._share(instant, along)))
+        share = min(1.0, max(0.0, self._find_share(instant, along)))
         return self.e0 + (self.e1 - self.e0) * share_done(self.shape, share)
 
     def sideways(self, instant: float, along: float, speed: float) -> float:
         """Speed to the left, m/s, at ``speed`` m/s along the line."""
-        share = self._share(instant, along)
+        share = self._find_share(instant, along)
         if not 0.0 < share < 1.0:
             return 0.0
         pace = 1.0 / self.duration if self.length is None else speed / self.length
         return (self.e1 - self.e0) * pace * share_slope(self.shape, share)
 
-    def _share(self, instant: float, along: float) -> float:
+    def _find_share(self, instant: float, along: float) -> float:
+        """Share of the time or of the metres that is over; below 0 before, above 1 after it."""
         if self.length is None:
             return (instant - self.begin) / self.duration
         return (along - self.start) / self.length

@@ -19,7 +19,8 @@ from odscen.formats.openscenario_import.story.read_motions import (
     teleported,
 )
 from odscen.lanegraph.query import node_id
-from odscen.scenario.story.motion_laws import STEEPEST
+from odscen.scenario.document.rules_document import USUAL_MOVE
+from odscen.scenario.story.motion_laws import SHARPEST, STEEPEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -93,8 +94,6 @@ _SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cubic"}
 _MEASURES: Final = {"time": "over", "rate": "rate", "distance": "within"}
 FOLLOWING: Final = "following"
 """Key of actions that follow one another, of one action of the file."""
-_USUAL: Final = 3.0
-"""Seconds of a lateral action that gives no measure that can be turned into some."""
 _RIGID: Final = 100.0
 """m/s², of a gap that is to be held without limits: the most that a rule can say."""
 IGNORED: Final = frozenset(
@@ -252,7 +251,7 @@ def _read_dynamics(read: ActionReader, dynamics: _Element | None) -> Made:
     """Duration, length or rate of a change of lane, and its shape."""
     report = read.conditions.report
     if dynamics is None:
-        return {"over": _USUAL}
+        return {"over": USUAL_MOVE}
     value = abs(report.number(dynamics, "value", 0.0))
     shape = dynamics.get("dynamicsShape", "sinusoidal")
     if shape == "step" or value == 0:
@@ -369,11 +368,9 @@ def _read_offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made
     if shape == "step":
         report.mark(kind, "approximated", "at once is within 0.1 s")
         return {"offset": {"to": metres, "over": 0.1}}
-    over = _USUAL
+    over = USUAL_MOVE
     if most > 0 and moves:
-        # Greatest |e''| of a half-cosine is pi^2 de / (2 T^2), that of a cubic 6 de / T^2; that of
-        # an even change is infinite, which lasts as long as a cubic.
-        greatest = math.pi**2 / 2.0 if shape == "sinusoidal" else 6.0
+        greatest = SHARPEST[_SHAPES.get(shape, "cosine")]
         over = max(math.sqrt(greatest * abs(moves) / most), 0.1)
     if most <= 0 or shape == "linear":
         report.mark(kind, "approximated", f"over {over:.2f} s")
@@ -406,20 +403,17 @@ def _read_abreast(read: ActionReader, kind: _Element, entity: ReadEntity) -> Mad
 
 
 def _read_limited_time(read: ActionReader, kind: _Element, moves: float) -> float:
-    """Seconds of a half-cosine over ``moves`` metres that keeps to the constraints of an action.
-
-    Its greatest speed is pi de / (2 T), its greatest acceleration pi^2 de / (2 T^2).
-    """
+    """Seconds of a half-cosine over ``moves`` metres that keeps to the constraints of an action."""
     report = read.conditions.report
     limits = report.child(kind, "DynamicConstraints")
     fastest = 0.0 if limits is None else report.number(limits, "maxSpeed", 0.0)
     hardest = 0.0 if limits is None else report.number(limits, "maxAcceleration", 0.0)
-    seconds = [math.pi * moves / (2.0 * fastest)] if fastest > 0 else []
-    seconds += [math.pi * math.sqrt(moves / (2.0 * hardest))] if hardest > 0 else []
+    seconds = [STEEPEST["cosine"] * moves / fastest] if fastest > 0 else []
+    seconds += [math.sqrt(SHARPEST["cosine"] * moves / hardest)] if hardest > 0 else []
     if limits is not None:
         words = "on a half-cosine that keeps to its speed and acceleration to the side"
         report.mark(limits, "approximated", words)
-    return float(max(round(max(seconds), 3), 0.1)) if seconds else _USUAL
+    return float(max(round(max(seconds), 3), 0.1)) if seconds else USUAL_MOVE
 
 
 def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, float]:
