@@ -162,6 +162,10 @@ class StoryView:
                 where, ahead = self._road.road_place(other.id), ahead - other.length / 2.0
         else:
             where = self._lane_position_of(to)
+        if other is None and where[0].startswith(":"):
+            abreast = self._metres_abreast(own, self.place(to))
+            if abreast is not None:
+                return abreast
         metres = self._road.driving_distance(actor, *where)
         if metres is None and other is None:
             under = _metres_under_body(own, self.place(to))
