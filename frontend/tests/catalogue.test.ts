@@ -113,7 +113,9 @@ test("a conversion report says the same of many places once, what was lost first
 
 test("steps of a job are reported in plain words, with the map's name if there are several", () => {
   expect(stepWords("making the SUMO network")).toBe("Step 3 of 4: preparing the simulation");
-  expect(stepWords("town: drawing the map")).toBe("town, step 4 of 4: drawing the map");
+  expect(stepWords("town: comparing the SUMO network with the map")).toBe(
+    "town, step 4 of 4: comparing the simulation with the map",
+  );
   expect(stepWords("waiting")).toBe("Waiting");
 });
 

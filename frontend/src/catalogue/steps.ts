@@ -9,7 +9,7 @@ const STEPS = localized((): [said: string, words: string][] => [
   ["reading the map", t`reading the file`],
   ["building the lane graph", t`finding all lanes and connections`],
   ["making the SUMO network", t`preparing the simulation`],
-  ["drawing the map", t`drawing the map`],
+  ["comparing the SUMO network with the map", t`comparing the simulation with the map`],
 ]);
 
 /** A job's step in words: with the map's name if there is one, and how many steps there are. */

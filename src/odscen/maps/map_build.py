@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from odscen.base.work_beside import work_beside
 from odscen.convert.lane_table.table_json import table_to_json
 from odscen.convert.model.conversion_report import ConversionReport
 from odscen.convert.verify.fidelity import verify
@@ -29,9 +30,11 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table.table import SumoLight
     from odscen.convert.model.conversion_settings import ConversionSettings
     from odscen.convert.verify.fidelity_result import Fidelity
+    from odscen.lanegraph.map_statistics import MapStatistics
     from odscen.maps.converters import GivenNetwork
     from odscen.maps.importers.base import ImportRecord
     from odscen.opendrive.parse import ReadRoads
+    from odscen.opendrive.road_model import OpenDrive
 
 
 FORMAT = "odscen-map"
@@ -107,16 +110,12 @@ def build_map(
         table=table,
         most_lanes=most_lanes,
     )
-    (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))
-    (folder / FILES["graph"]).write_bytes(to_graphml(graph))
-    progress("making the SUMO network", 0.4)
-    network = converted(settings.converter, MapInput(content, odr, table, graph.walks, given))
-    progress("drawing the map", 0.8)
-    drawing = map_drawing(odr, table, name=name)
     statistics = map_statistics(odr, table, graph)
-    preview = render_drawing(drawing, statistics=statistics)
-    (folder / FILES["drawing"]).write_text(drawing.to_json(), encoding="utf-8")
-    (folder / FILES["preview"]).write_text(preview, encoding="utf-8")
+    progress("making the SUMO network", 0.3)
+    with work_beside(lambda: _write_pictures(folder, name, odr, table, graph, statistics)):
+        network = converted(settings.converter, MapInput(content, odr, table, graph.walks, given))
+        progress("comparing the SUMO network with the map", 0.7)
+        fidelity = verify(network.net_xml, odr, table, offset=network.table.net_offset)
     (folder / FILES["net"]).write_bytes(network.net_xml)
     (folder / FILES["lane_table"]).write_text(table_to_json(network.table), encoding="utf-8")
     header, report = odr.header, network.report
@@ -142,15 +141,30 @@ def build_map(
         "files": FILES if imported is None else {**FILES, "original": imported.original},
         "semantics": map_semantics(odr, table),
         "report": report.to_dict(),
-        "fidelity": _measure_fidelity(
-            verify(network.net_xml, odr, table, offset=network.table.net_offset)
-        ),
+        "fidelity": _measure_fidelity(fidelity),
         **({} if imported is None else {"import": imported.to_dict()}),
         "build_seconds": round(time.perf_counter() - start, 3),
     }
     text = json.dumps(info, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / FILES["info"]).write_text(text + "\n", encoding="utf-8")
     progress("done", 1.0)
+
+
+def _write_pictures(
+    folder: Path,
+    name: str,
+    odr: OpenDrive,
+    table: RoadTable,
+    graph: MapGraph,
+    statistics: MapStatistics,
+) -> None:
+    """Write the graph and the drawings of a map."""
+    (folder / FILES["graph_npz"]).write_bytes(to_npz_bytes(graph))
+    (folder / FILES["graph"]).write_bytes(to_graphml(graph))
+    drawing = map_drawing(odr, table, name=name)
+    (folder / FILES["drawing"]).write_text(drawing.to_json(), encoding="utf-8")
+    preview = render_drawing(drawing, statistics=statistics)
+    (folder / FILES["preview"]).write_text(preview, encoding="utf-8")
 
 
 def _measure_fidelity(fidelity: Fidelity) -> dict[str, Any]:

@@ -182,8 +182,10 @@ def test_lane_borders_are_within_two_centimetres_of_any_road(
     table = RoadTable.of(model)
     row = np.zeros(2, dtype=np.int64)
     z = table.points(row, np.array([0.0, road.length]), np.zeros(2), np.zeros(2))[2]
-    # Ends are square to the road: a little before or behind those of the borders.
-    assert z == pytest.approx([5.0, 5.0 + slope * s[-1]], abs=0.15)
+    # Ends are square to the road: before or behind those of the borders, by more on wide roads, as
+    # borders of points 12 m apart may leave a bend at a quarter of a radian.
+    behind = max(3.0, 0.25 * lanes * width)
+    assert z == pytest.approx([5.0, 5.0 + slope * s[-1]], abs=0.05 * behind)
 
 
 def test_skewed_ends_belong_to_the_road_behind_and_are_exact_there() -> None:

@@ -197,7 +197,8 @@ def _metres_to_place(line: shapely.LineString, place: shapely.Geometry) -> float
     shared = line.intersection(place)
     if shared.is_empty:
         return float(line.length)
-    return float(min(line.project(shapely.Point(xy)) for xy in shapely.get_coordinates(shared)))
+    places = shapely.points(shapely.get_coordinates(shared))
+    return float(shapely.line_locate_point(line, places).min())
 
 
 def inner_junctions(

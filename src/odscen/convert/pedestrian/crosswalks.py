@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import shapely
+from scipy.spatial import cKDTree
 
 from odscen.convert.model.access import allowed
 from odscen.convert.model.edge_plan import RoadGap
@@ -55,12 +57,16 @@ def place_crosswalks(
     _, owner, share = spread(extent, DENSE)
     s = table.lane_s0[rows][owner] + share * extent[owner]
     points = table.lane_points(rows[owner], s)
-    tree = shapely.STRtree(shapely.points(points.x, points.y))
+    tree = cKDTree(np.column_stack((points.x, points.y)))
     placed: list[PlacedCrosswalk] = []
     taken: dict[RoadId, list[RoadGap]] = {}
     for crosswalk in found:
         area = shapely.Polygon(crosswalk.polygon).buffer(DENSE / 2.0)
-        inside = np.sort(tree.query(area, predicate="intersects"))
+        west, south, east, north = area.bounds
+        middle = (0.5 * (west + east), 0.5 * (south + north))
+        reach = math.hypot(east - west, north - south)  # twice what is needed
+        near = np.array(tree.query_ball_point(middle, reach, return_sorted=True), dtype=np.int64)
+        inside = near[shapely.intersects_xy(area, points.x[near], points.y[near])]
         inside = inside[np.abs(points.z[inside] - crosswalk.z) < LEVEL]
         roads = table.lane_road[rows[owner[inside]]]
         outside: list[tuple[RoadId, float]] = []

@@ -369,5 +369,6 @@ def _passed_metres(line: shapely.LineString, place: shapely.Geometry) -> tuple[f
     if shared.is_empty:
         way = float(line.project(place.centroid))
         return way, way
-    ways = [line.project(shapely.Point(xy)) for xy in shapely.get_coordinates(shared)]
-    return float(min(ways)), float(max(ways))
+    places = shapely.points(shapely.get_coordinates(shared))
+    metres = shapely.line_locate_point(line, places)
+    return float(metres.min()), float(metres.max())

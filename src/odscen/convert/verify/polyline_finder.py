@@ -145,10 +145,11 @@ class Finder:
         pieces = self.pieces
         if not len(pieces.xy):
             return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
-        found: Any = self._piece_tree.query_ball_point(places.xy, radius)  # lists, one per place
-        count = np.array([len(rows) for rows in found], dtype=np.int64)
-        near = np.concatenate([np.zeros(0, np.int64), *found]).astype(np.int64)
-        place = np.repeat(np.arange(len(found)), count)
+        # Pairs as an array, which is twice as fast as a list of pieces for each place.
+        pairs: Any = cKDTree(places.xy).sparse_distance_matrix(
+            self._piece_tree, radius, output_type="ndarray"
+        )
+        place, near = pairs["i"], pairs["j"]
         if directed:
             same = np.sum(places.ahead[place] * pieces.ahead[near], axis=1) > _COS
             place, near = place[same], near[same]
@@ -171,7 +172,7 @@ class Finder:
         row = np.full(len(places.xy), -1, dtype=np.int64)
         todo = np.arange(len(places.xy))
         # Nearly all places have a piece beside them; only the others are worth a wide search.
-        for radius in (2.0 * STEP, 3.0, reach):
+        for radius in (0.05, 2.0 * STEP, 3.0, reach):
             limit = min(radius, reach)
             for start in range(0, len(todo), _CHUNK):
                 rows = todo[start : start + _CHUNK]
