@@ -6,6 +6,7 @@ import bz2
 import gzip
 import math
 from collections import Counter
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -21,7 +22,13 @@ from odscen.learning.offered_options import values_for
 from odscen.maps.importers.openstreetmap import OpenStreetMapImporter
 from odscen.maps.importers.osm.junctions import choose_exits, match_lanes
 from odscen.maps.importers.osm.osm_file import Box, cut_out, is_osm, read_extract
-from odscen.maps.importers.osm.street_line import Pose, curve_between, smooth_line
+from odscen.maps.importers.osm.street_line import (
+    Pose,
+    curve_between,
+    curves_between,
+    least_radius,
+    smooth_line,
+)
 from odscen.maps.importers.osm.street_tags import (
     KMH,
     MPH,
@@ -484,6 +491,43 @@ def test_crossroads_have_twelve_turns_and_right_of_way_as_the_law_has_it() -> No
     assert all(entry.source_id for entry in entries)
 
 
+def test_a_priority_road_goes_first_whatever_its_class() -> None:
+    tags = {"highway": "residential", "priority_road": "designated"}
+    odr, entries = imported(named_crossroads(tags={10: tags, 12: tags}))
+    names = {str(road.id): road.name for road in odr.roads.values()}
+    (junction,) = odr.junctions.values()
+    pairs = {(names[str(high)], names[str(low)]) for high, low in junction.priorities}
+    assert pairs == {(a, b) for a in ("north", "south") for b in ("east", "west")}
+    (said,) = [e for e in entries if "the priority road" in e.reason]
+    assert said.confidence == 0.9
+
+
+def test_a_lane_that_only_faces_a_one_way_street_turns_back() -> None:
+    # Two ways as far as a node, and from there on one way towards it.
+    ways = {
+        10: ([1, 2], {"highway": "residential"}),
+        11: ([3, 2], {"highway": "residential", "oneway": "yes"}),
+    }
+    odr, _ = imported(place_of({1: (0.0, 0.0), 2: (80.0, 0.0), 3: (160.0, 0.0)}, ways))
+    assert_leads_on(odr)
+
+
+@pytest.mark.parametrize(
+    ("end", "radius"),
+    [
+        (Pose(60.0, 8.0, math.pi / 2), 7.5),  # ends soon behind where its tangents meet
+        (Pose(8.0, 60.0, math.pi / 2), 7.5),
+        (Pose(15.6, 12.6, 0.0), 7.5),  # two arcs of 8 m, where one cubic has 5.1
+    ],
+)
+def test_turns_have_the_radius_that_there_is_room_for(end: Pose, radius: float) -> None:
+    parts = curves_between(Pose(0.0, 0.0, 0.0), end)
+    assert least_radius(parts) > radius
+    assert parts[-1].places()[-1] == pytest.approx([end.x, end.y], abs=1e-9)
+    for one, after in pairwise(parts):
+        assert one.places()[-1] == pytest.approx(after.places()[0], abs=1e-9)
+
+
 def test_restrictions_forbid_and_prescribe_turns_over_nodes() -> None:
     no_left = (
         {"type": "restriction", "restriction": "no_left_turn"},
@@ -696,8 +740,9 @@ def test_crossings_come_from_nodes_and_footways_and_stay_out_of_the_junction() -
     }
     assert set(walks) == {"north", "east"}
     north = next(road for road in odr.roads.values() if road.name == "north")
-    # The road ends between the junction and the crossing at 9 m.
-    assert 150.0 - walks["north"].s == pytest.approx(9.0, abs=0.1)
+    # The road ends between the junction and the crossing, which is at 9 m: for the corner to have a
+    # radius of 4.5 m, and the lane of 6, it moves by 0.8 m.
+    assert 150.0 - walks["north"].s == pytest.approx(9.76, abs=0.1)
     assert north.length > walks["north"].s + 1.5
     assert 150.0 - walks["east"].s == pytest.approx(60.0, rel=0.01)
     sources = {entry.source_id: entry.outcome for entry in entries if "crossing" in entry.reason}

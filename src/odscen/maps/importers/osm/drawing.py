@@ -26,8 +26,15 @@ from odscen.maps.importers.osm.road_plan import (
     street_kind,
     write_geometry,
 )
-from odscen.maps.importers.osm.street_line import Cubic, Pose, curve_between
-from odscen.maps.importers.osm.street_tags import CLASSES, NO_LIMIT, StreetLane
+from odscen.maps.importers.osm.street_line import (
+    DRIVABLE,
+    Cubic,
+    Pose,
+    curve_between,
+    curves_between,
+    least_radius,
+)
+from odscen.maps.importers.osm.street_tags import CLASSES, NO_LIMIT, StreetLane, rank_street
 from odscen.opendrive import road_model as model
 
 if TYPE_CHECKING:
@@ -47,6 +54,8 @@ ISLAND_WIDTH = 1.2
 """Metres of an island in the middle of a street, where no lane gives it room: cars drive beside."""
 ISLAND_LENGTH = 2.0
 ISLAND_HEIGHT = 0.15
+LESS_ROUND = 1.5
+"""Metres by which a crossing before a junction may make the radius of its kerb smaller."""
 KERB_GAP = 0.5
 """Metres between a junction and a crosswalk before it."""
 STOP_GAP = 1.0
@@ -54,6 +63,8 @@ STOP_GAP = 1.0
 REACH = 0.3
 """Metres that a crosswalk reaches onto the sidewalks."""
 TURN_SPEED = 50 / 3.6
+SHARPEST = 5.0
+"""Metres of the radius of a lane up to which a turn is said to be too sharp for a bus."""
 LOOP = 9.0
 """Metres of the handles of a turn at a dead end."""
 DETOUR = 6.0
@@ -119,7 +130,7 @@ def draw_map(extract: Extract, network: StreetNetwork, *, name: str) -> DrawnMap
     )
     inner = {number: junction for junction in layout.junctions for number in junction.inner}
     ranks = {
-        leg: CLASSES[network.ways[places.leg_way(network, leg)].tags["highway"]].rank
+        leg: rank_street(network.ways[places.leg_way(network, leg)].tags)
         for junction in layout.junctions
         for leg in junction.legs
     }
@@ -186,7 +197,10 @@ def draw_map(extract: Extract, network: StreetNetwork, *, name: str) -> DrawnMap
 def _make_room_for_crossings(
     network: StreetNetwork, layout: Layout, crossings: Sequence[StreetCrossing]
 ) -> None:
-    """Let roads end between the junction and a crossing shortly before it, where there is room."""
+    """Let roads end between the junction and a crossing shortly before it, where there is room.
+
+    Corners keep enough of their rounding for a bus, for which the crossing may have to move.
+    """
     for crossing in crossings:
         length = network.streets[crossing.street].line.length
         for at_end in (False, True):
@@ -195,8 +209,9 @@ def _make_room_for_crossings(
             if leg not in layout.cuts or away > length / 2:
                 continue
             room = away - CROSSWALK / 2 - KERB_GAP
+            least = max(layout.bare[leg], layout.cuts[leg] - LESS_ROUND)
             if layout.bare[leg] <= room < layout.cuts[leg]:
-                layout.cuts[leg] = room
+                layout.cuts[leg] = max(room, least)
 
 
 def _plan_roads(
@@ -686,9 +701,11 @@ def _rank_priorities(
         if len(legs) < 3 or not low or len(high) < 2:
             return ()
         source = f"way {places.leg_way(network, low[0])}"
-        reason = "gives way to the more important street: no sign says who does"
+        said = top > max(street.rank for street in CLASSES.values())
+        what = "the priority road" if said else "the more important street"
+        reason = f"gives way to {what}: no sign says who does"
         element = f"junction {number} > road {plans[low[0].street].id}"
-        drawn.note(ElementOutcome.GUESSED, element, reason, 0.6, source)
+        drawn.note(ElementOutcome.GUESSED, element, reason, 0.9 if said else 0.6, source)
     pairs = {
         (plans[a.street].id, plans[b.street].id) for a in high for b in low if a.street != b.street
     }
@@ -725,6 +742,9 @@ def _find_movements(
         if ahead and not wants_back:
             paths = {other: paths[other] for other in ahead}
         exits = sorted(paths, key=lambda other: (-turns[other], other))
+        if not any(_car_lanes(outs[e].lanes, "driving") for e in exits) and outs[leg].lanes:
+            movements += _turn_round(start, outs[leg])  # only one-way streets that lead here
+            continue
         for kind in ("driving", "bus"):
             coming = [i for i, lane in enumerate(start.lanes) if lane.kind == kind]
             lanes_at = {e: _car_lanes(outs[e].lanes, kind) for e in exits}
@@ -863,10 +883,16 @@ def _connect_lanes(
     begin = start.centre(movement.lane).left(first.width / 2)
     finish = end.centre(movement.target).left(last.width / 2)
     bulge = LOOP if start.leg.street == end.leg.street else 0.0
-    parts = [curve_between(begin, finish, bulge=bulge)]
+    parts = curves_between(begin, finish, bulge=bulge)
     if len(movement.through) > 1:
-        parts = _follow_path(network, movement, begin, finish) or parts
+        parts = _follow_path(network, movement, begin, finish, parts)
     kinds = (first.kind, last.kind)
+    aside = math.copysign(min(first.width, last.width) / 2.0, movement.turn)
+    radius = least_radius(parts) + aside  # of the middle of the lane, right of the line
+    if radius < SHARPEST and "biking" not in kinds and abs(movement.turn) < places.BACK:
+        way = f"way {places.leg_way(network, start.leg)}"
+        reason = f"a turn with a radius of {max(radius, 1.0):.0f} m: too sharp for a bus"
+        drawn.note(ElementOutcome.GUESSED, f"junction {junction}", reason, 0.3, way)
     kind = "biking" if "biking" in kinds else "bus" if "bus" in kinds else "driving"
     lane = replace(first, kind=kind)
     plan, onto = plans[start.leg.street], plans[end.leg.street]
@@ -966,12 +992,12 @@ def _speed_at(plan: RoadPlan, *, at_end: bool, arriving: bool) -> float:
 
 
 def _follow_path(
-    network: StreetNetwork, movement: Movement, begin: Pose, finish: Pose
+    network: StreetNetwork, movement: Movement, begin: Pose, finish: Pose, direct: list[Cubic]
 ) -> list[Cubic]:
-    """Curves along the nodes inside a large junction, where a single one would stray from them."""
-    direct = curve_between(begin, finish).places()
+    """Curves along the nodes inside a large junction, where the direct one strays from them."""
+    drawn = np.vstack([part.places() for part in direct])
     inside = [network.places[node] for node in movement.through]
-    astray = [place for place in inside if np.hypot(*(direct - np.array(place)).T).min() > DETOUR]
+    astray = [place for place in inside if np.hypot(*(drawn - np.array(place)).T).min() > DETOUR]
     ahead = [begin.x, begin.y]
     astray = [
         place
@@ -982,13 +1008,16 @@ def _follow_path(
         > 3.0
     ]
     if not astray:
-        return []
+        return direct
     route = [(begin.x, begin.y), *astray, (finish.x, finish.y)]
     poses = [begin]
     for before, here, after in zip(route[:-2], route[1:-1], route[2:], strict=True):
         poses.append(Pose(*here, math.atan2(after[1] - before[1], after[0] - before[0])))
     poses.append(finish)
-    return [curve_between(a, b) for a, b in itertools.pairwise(poses)]
+    led = [part for a, b in itertools.pairwise(poses) for part in curves_between(a, b)]
+    # Better beside the nodes than along a bend that nobody can drive.
+    sharp = least_radius(led)
+    return led if sharp > DRIVABLE or sharp > least_radius(direct) else direct
 
 
 # ------------------------------------------------------------------ pedestrians at junctions

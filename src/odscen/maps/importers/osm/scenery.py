@@ -18,7 +18,7 @@ import shapely
 from odscen.opendrive import road_model as model
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
     from odscen.maps.importers.osm.osm_file import Extract, Tags
@@ -46,6 +46,8 @@ RAMP = 20.0
 """Metres of a ramp for each metre that it rises; its steepest place then has 7.5 %, about the most
 that RASt 06 has for main roads (8 %)."""
 _STEP = 10.0
+_SAME = 1e-6
+"""Between coefficients of cubics that are one."""
 LEVEL = 0.005
 """Metres of height below which a road is flat."""
 
@@ -290,7 +292,7 @@ class StreetHeights:
         if np.abs(z).max() < LEVEL:
             return ()
         grade = self._grades_at(plan, s)
-        return tuple(
+        return _without_repeated(
             hermite(float(s[i]), float(s[i + 1] - s[i]), z[i : i + 2], grade[i : i + 2])
             for i in range(len(s) - 1)
         )
@@ -307,6 +309,20 @@ class StreetHeights:
         along, z = self.by_street[plan.street]
         graded: FloatArray = np.interp(s + plan.before, along, np.gradient(z, along))
         return graded
+
+
+def _without_repeated(cubics: Iterable[model.Cubic]) -> tuple[model.Cubic, ...]:
+    """Leave out cubics that only continue the one before them."""
+    kept: list[model.Cubic] = []
+    for cubic in cubics:
+        if kept:
+            _, a, b, c, d = kept[-1]
+            t = cubic.s - kept[-1].s
+            goes_on = (a + t * (b + t * (c + t * d)), b + t * (2 * c + 3 * t * d), c + 3 * t * d, d)
+            if np.abs(np.array(goes_on) - cubic[1:]).max() < _SAME:
+                continue
+        kept.append(cubic)
+    return tuple(kept)
 
 
 def hermite(s: float, length: float, z: FloatArray, grade: FloatArray) -> model.Cubic:

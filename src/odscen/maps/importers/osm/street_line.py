@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -10,7 +11,7 @@ import numpy as np
 import shapely
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from odscen.base.arrays import FloatArray
 
@@ -21,6 +22,15 @@ MOST_OFF = 1.2
 LEAST_RADIUS = 9.0
 """Metres, of arcs at tight bends, where there is room for it."""
 _SHORTEST = 0.05
+_TURNS = math.radians(20.0), math.radians(130.0)
+"""Turns of which the tangents meet near enough to be those of an arc."""
+_SHORTEST_TANGENT = 2.0
+DRIVABLE = 6.0
+"""Metres of radius that a bus needs."""
+_HANDLES = (0.25, 0.35, 0.45, 0.6, 0.8)
+"""Shares of the chord that handles of a curve have that would be sharper."""
+_UNEVEN = 0.5
+"""Metres by which tangents may differ without a straight piece."""
 
 
 class Pose(NamedTuple):
@@ -241,6 +251,61 @@ class Cubic(NamedTuple):
         return placed
 
 
+def curves_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> list[Cubic]:
+    """A smooth curve from pose to pose; straight first or last where one end is farther away.
+
+    As :func:`curve_between`, but a turn whose tangents meet much nearer to one of the poses is
+    driven with the radius of the shorter tangent, in place of one that becomes sharp at its end,
+    and one that is sharper than a bus can drive is as wide as a curve can be.
+    """
+    turn = math.remainder(end.hdg - start.hdg, 2.0 * math.pi)
+    if bulge == 0.0 and _TURNS[0] < abs(turn) < _TURNS[1]:
+        dx, dy = end.x - start.x, end.y - start.y
+        cos, sin = math.cos(start.hdg), math.sin(start.hdg)
+        meet = (dy * cos - dx * sin) / math.sin(turn)
+        ahead = dx * cos + dy * sin - meet * math.cos(turn)
+        short = min(meet, ahead)
+        if short > _SHORTEST_TANGENT and max(meet, ahead) - short > _UNEVEN:
+            begins, ends = start.ahead(max(0.0, ahead - short)), end.ahead(-max(0.0, meet - short))
+            straight = [_straight(start, begins)] if ahead > meet else []
+            after = [_straight(ends, end)] if meet > ahead else []
+            return [*straight, curve_between(begins, ends), *after]
+    curve = [curve_between(start, end, bulge=bulge)]
+    if bulge == 0.0 and least_radius(curve) < DRIVABLE:
+        return max((curve, *_wider_curves(start, end)), key=least_radius)
+    return curve
+
+
+def _wider_curves(start: Pose, end: Pose) -> Iterator[list[Cubic]]:
+    """Other curves from pose to pose: two arcs, and curves with handles of other lengths."""
+    along, across = end.x - start.x, end.y - start.y
+    chord, ahead = math.hypot(along, across), math.atan2(across, along)
+    before, behind = (math.remainder(pose.hdg - ahead, 2.0 * math.pi) for pose in (start, end))
+    between = Pose(
+        0.5 * (start.x + end.x), 0.5 * (start.y + end.y), ahead - 0.5 * (before + behind)
+    )
+    yield [curve_between(start, between), curve_between(between, end)]
+    for first, second in itertools.product(_HANDLES, repeat=2):
+        yield [_bezier(start, end, first * chord, second * chord)]
+
+
+def least_radius(parts: Sequence[Cubic]) -> float:
+    """The smallest radius of curves one behind the other, metres."""
+    bends = [0.0]
+    p = np.linspace(0.0, 1.0, 41)
+    for part in parts:
+        (_, b, c, d), (_, e, f, g) = part.u, part.v
+        du, dv = b + 2 * c * p + 3 * d * p * p, e + 2 * f * p + 3 * g * p * p
+        ddu, ddv = 2 * c + 6 * d * p, 2 * f + 6 * g * p
+        bends.append(float((np.abs(du * ddv - dv * ddu) / np.hypot(du, dv) ** 3).max()))
+    return 1.0 / max(*bends, 1e-9)
+
+
+def _straight(start: Pose, end: Pose) -> Cubic:
+    length = math.hypot(end.x - start.x, end.y - start.y)
+    return Cubic(start, length, (0.0, length, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
+
+
 def curve_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> Cubic:
     """A smooth curve from pose to pose: a cubic Bezier curve with the handles of a circle.
 
@@ -265,6 +330,15 @@ def curve_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> Cubic:
         if min(meet, ahead) > 0.2 * chord:
             factor = 4.0 / 3.0 * math.tan(abs(turn) / 4) / math.tan(abs(turn) / 2)
             first, second = max(factor, 0.55) * ahead, max(factor, 0.55) * meet
+    return _bezier(start, end, first, second)
+
+
+def _bezier(start: Pose, end: Pose, first: float, second: float) -> Cubic:
+    """The cubic Bezier curve from pose to pose with handles of these lengths, metres."""
+    dx, dy = end.x - start.x, end.y - start.y
+    cos, sin = math.cos(start.hdg), math.sin(start.hdg)
+    u, v = dx * cos + dy * sin, dy * cos - dx * sin
+    turn = end.hdg - start.hdg
     out = (u - second * math.cos(turn), v - second * math.sin(turn))
     p0, p1, p2, p3 = np.array([(0.0, 0.0), (first, 0.0), out, (u, v)])
     coefficients = np.array([p0, 3 * (p1 - p0), 3 * (p2 - 2 * p1 + p0), p3 - 3 * p2 + 3 * p1 - p0])

@@ -67,6 +67,10 @@ CLASSES = {
 }
 """Ways of vehicles, by ``highway``."""
 
+PRIORITY_ROADS = {"designated", "yes", "yes_unposted"}
+"""Values of ``priority_road`` that say that a street goes first."""
+_SAID_TO_GO_FIRST = 20
+
 FOOT_CLASSES = {"footway", "path", "pedestrian", "steps", "corridor", "bridleway", "platform"}
 MINOR_SERVICES = {"driveway", "parking_aisle", "drive-through", "emergency_access", "slipway"}
 
@@ -269,6 +273,15 @@ class StreetReading:
 
 _SWAP = {"left": "right", "right": "left"}
 _SIDES = re.compile(r"(?<![a-z])(left|right)(?![a-z])")
+
+
+def rank_street(tags: Tags) -> int:
+    """How important a street is at a junction without signs; the higher goes first.
+
+    By ``priority_road``, else by its class.
+    """
+    first = tags.get("priority_road") in PRIORITY_ROADS
+    return CLASSES[tags["highway"]].rank + (_SAID_TO_GO_FIRST if first else 0)
 
 
 def mirror_tags(tags: Tags) -> Tags:
