@@ -36,7 +36,7 @@ from bench.common import shared_maps
 from bench.same_limits import add_signs_and_inner_limits, map_with_limits
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
 HOUR = 3600.0
 END = float(os.environ.get("ODSCEN_BENCH_SECONDS", HOUR))
@@ -95,7 +95,7 @@ def main() -> None:
             versions = _versions(path, Path(folder))
             for file, label in versions[: 1 if ONLY_ON else None]:
                 try:
-                    bench = _MapBench(file, Path(folder), label, places=path)
+                    bench = _bench_of(file, Path(folder), label, places=path)
                 except subprocess.CalledProcessError:
                     print(f"| {label} | | | netconvert cannot read it |")
                     break
@@ -159,41 +159,72 @@ def _maps() -> list[Path | str]:
     return [*(path for path in found if path.stem in names.split(",")), *made]
 
 
-class _MapBench:
-    """One map with its networks."""
+def _bench_of(path: Path, folder: Path, label: str, *, places: Path) -> NetworkBench:
+    """Ours of an OpenDRIVE map, netconvert's, and netconvert's with the same limits."""
+    import carla
 
-    def __init__(self, path: Path, folder: Path, label: str, *, places: Path) -> None:
-        import carla
+    files = {"ours": folder / "ours.net.xml", "netconvert": folder / "peer.net.xml"}
+    build_own(path, files["ours"])
+    text = path.read_text(encoding="utf-8", errors="replace")
+    left = ["--lefthand"] if 'rule="LHT"' in text else []
+    run_tool("netconvert", "--opendrive-files", path, "-o", files["netconvert"],
+          "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
+    limited, net = folder / "limited.xodr", folder / "limited.net.xml"
+    map_with_limits(path, limited)
+    run_tool("netconvert", "--opendrive-files", limited, "-o", net,
+          "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
+    add_signs_and_inner_limits(path, files["ours"], net)
+    files["limited"] = net
+    text = places.read_text(encoding="utf-8", errors="replace")
+    lengths = {r.get("id"): float(r.get("length", 0)) for r in ET.fromstring(text).iter("road")}
+    waypoints = [
+        w
+        for w in carla.Map(path.stem, text).generate_waypoints(SPACING)
+        if not w.is_junction
+        and w.lane_width >= NARROWEST
+        and FROM_ENDS < w.s < lengths.get(str(w.road_id), 0.0) - FROM_ENDS
+    ]
+    return NetworkBench(folder, label, files, [_place_of(w.transform) for w in waypoints])
+
+
+def _place_of(transform: Any) -> tuple[float, float, float]:
+    """x, y and heading in OpenDRIVE's frame of a transform of CARLA's."""
+    location, yaw = transform.location, transform.rotation.yaw
+    return location.x, -location.y, math.radians(-yaw)
+
+
+class NetworkBench:
+    """Networks of one map, on which the same trips are driven.
+
+    Parameters
+    ----------
+    folder
+        For what is written.
+    label
+        Of its rows.
+    files
+        The networks, ours first and the one to compare with last.
+    places
+        Places that trips join: x and y in metres of the map, and heading.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        label: str,
+        files: Mapping[str, Path],
+        places: Sequence[tuple[float, float, float]],
+    ) -> None:
         import sumolib
 
-        self._label, self._folder = label, folder
-        self._files = {"ours": folder / "ours.net.xml", "netconvert": folder / "peer.net.xml"}
-        _build(path, self._files["ours"])
-        text = path.read_text(encoding="utf-8", errors="replace")
-        left = ["--lefthand"] if 'rule="LHT"' in text else []
-        _tool("netconvert", "--opendrive-files", path, "-o", self._files["netconvert"],
-              "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
-        limited, net = folder / "limited.xodr", folder / "limited.net.xml"
-        map_with_limits(path, limited)
-        _tool("netconvert", "--opendrive-files", limited, "-o", net,
-              "--no-turnarounds", "--no-warnings", *left)  # fmt: skip
-        add_signs_and_inner_limits(path, self._files["ours"], net)
-        self._files["limited"] = net
-        text = places.read_text(encoding="utf-8", errors="replace")
-        lengths = {r.get("id"): float(r.get("length", 0)) for r in ET.fromstring(text).iter("road")}
-        self._waypoints = [
-            w
-            for w in carla.Map(path.stem, text).generate_waypoints(SPACING)
-            if not w.is_junction
-            and w.lane_width >= NARROWEST
-            and FROM_ENDS < w.s < lengths.get(str(w.road_id), 0.0) - FROM_ENDS
-        ]
-        self.kilometres = len(self._waypoints) * SPACING / 1000.0
+        self._label, self._folder, self._files = label, folder, dict(files)
+        self._waypoints = places
+        self.kilometres = len(places) * SPACING / 1000.0
         self._nets = {name: sumolib.net.readNet(str(f)) for name, f in self._files.items()}
         self._known: dict[int, dict[str, _Place] | None] = {}
 
     def measure(self, level: int, seeds: Sequence[int]) -> list[float]:
-        """Print a row with lights and one without; ratios of the delays, of the same limits."""
+        """Print a row with lights and one without; ratios of the delays to the last one's."""
         departs = self._trips(max(20, int(level * self.kilometres)))
         lit = bool(
             self._nets["ours"].getTrafficLights() or self._nets["netconvert"].getTrafficLights()
@@ -264,16 +295,14 @@ class _MapBench:
             )
         source, target = self._folder / "trips.xml", self._folder / "routed.xml"
         source.write_text(f"<routes>{''.join(rows)}</routes>")
-        _tool("duarouter", "-n", self._files[name], "-r", source, "-o", target,
+        run_tool("duarouter", "-n", self._files[name], "-r", source, "-o", target,
               "--ignore-errors", "--no-warnings", "--no-step-log")  # fmt: skip
         return {v.get("id", ""): v for v in ET.parse(target).getroot().iter("vehicle")}
 
     def _places(self, number: int) -> dict[str, _Place] | None:
         if number not in self._known:
-            transform = self._waypoints[number].transform
-            x, y = transform.location.x, -transform.location.y
-            heading = math.radians(-transform.rotation.yaw)
-            found = {name: _nearest(net, x, y, heading) for name, net in self._nets.items()}
+            place = self._waypoints[number]
+            found = {name: _nearest(net, *place) for name, net in self._nets.items()}
             whole = {name: place for name, place in found.items() if place}
             self._known[number] = whole if len(whole) == len(found) else None
         return self._known[number]
@@ -290,7 +319,7 @@ class _MapBench:
         ]
         files = ",".join(str(self._folder / file) for file in routes)
         for seed in seeds:
-            _tool("sumo", "-n", self._files[name], "-r", files,
+            run_tool("sumo", "-n", self._files[name], "-r", files,
                   "--end", f"{END:g}", "--step-length", "0.5", "--seed", str(seed),
                   "--tripinfo-output", info, "--tripinfo-output.write-unfinished",
                   "--statistic-output", stats, "--no-warnings", "--no-step-log",
@@ -343,7 +372,8 @@ def _nearest(net: Any, x: float, y: float, heading: float) -> _Place | None:
     return None
 
 
-def _build(path: Path, target: Path) -> None:
+def build_own(path: Path, target: Path) -> None:
+    """Write our network of an OpenDRIVE map."""
     from odscen.convert.building.network import build_network
     from odscen.lanegraph.build_graphs import build_map_graph
     from odscen.opendrive.lanes import RoadTable
@@ -355,7 +385,8 @@ def _build(path: Path, target: Path) -> None:
     target.write_bytes(build_network(odr, table, graph.walks).net_xml)
 
 
-def _tool(name: str, *arguments: object) -> None:
+def run_tool(name: str, *arguments: object) -> None:
+    """Run one of SUMO's programs."""
     import sumo
 
     home = Path(sumo.SUMO_HOME)

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
-from bench.capacity import VTYPE, _build, _tool
+from bench.capacity import VTYPE, build_own, run_tool
 from odscen.convert.model.net import STAGE
 from odscen.convert.signals.signal_programs import LEAST_GREEN, LONGEST_CYCLE, SHORTEST_CYCLE
 from tools.make_maps.__main__ import SHIPPED, map_text
@@ -80,7 +80,7 @@ def _build_crossing(name: str, folder: Path) -> _Crossing:
         file = folder / f"{name}.xodr"
         file.write_text(map_text(name), encoding="utf-8")
     path = folder / "crossing.net.xml"
-    _build(file, path)
+    build_own(file, path)
     net = sumolib.net.readNet(str(path))
     (light,) = net.getTrafficLights()
     exits: dict[str, dict[str, str]] = {}
@@ -225,7 +225,7 @@ def _vehicles(
 
 def _drive(net: Path, routes: Path, departs: dict[str, float], folder: Path, seed: int) -> float:
     info = folder / "info.xml"
-    _tool("sumo", "-n", net, "-r", routes, "--end", str(SECONDS), "--step-length", "0.5",
+    run_tool("sumo", "-n", net, "-r", routes, "--end", str(SECONDS), "--step-length", "0.5",
           "--seed", str(seed), "--tripinfo-output", info, "--tripinfo-output.write-unfinished",
           "--no-warnings", "--no-step-log")  # fmt: skip
     seen = {trip.get("id", ""): trip for trip in ET.parse(info).getroot().iter("tripinfo")}

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from bench.capacity import HOUR, _build, _tool
+from bench.capacity import HOUR, build_own, run_tool
 from odscen.base.categories import DEFAULT_BODY, Category
 from odscen.figures.by_place.capacity import SNEAKERS
 from odscen.scenario.document.drivers_document import Drivers
@@ -118,7 +118,7 @@ def _saturation_table(folder: Path, steps: list[str], seeds: list[int]) -> list[
     """Print saturation flows; those of ``signal_crossing``, by step."""
     straight, crossing = folder / "straight.net.xml", folder / "crossing.net.xml"
     straight_road(straight)
-    _build(MAPS / "signal_crossing.xodr", crossing)
+    build_own(MAPS / "signal_crossing.xodr", crossing)
     rows = {
         "straight, 50 km/h": (straight, "in out", "in_0", Drivers()),
         "signal_crossing": (crossing, "1.0.f 1.1.f 3.1.b 3.0.b", "1.1.f_1", Drivers()),
@@ -170,7 +170,7 @@ def build_without_crosswalks(name: str, folder: Path) -> Path:
     source.write_text(
         re.sub(r'<object [^>]*type="crosswalk".*?</object>', "", text, flags=re.DOTALL)
     )
-    _build(source, net)
+    build_own(source, net)
     return net
 
 
@@ -194,7 +194,7 @@ def _permissive_table(
     print("\n| permissive left turn at lights, veh/h, and share of HCM's; step | oncoming |")
     print("|---|---|")
     net = folder / "lights.net.xml"
-    _build(MAPS / "signal_crossing.xodr", net)
+    build_own(MAPS / "signal_crossing.xodr", net)
     for step, leaving in zip(steps, saturation, strict=True):
         cells = []
         for volume in VOLUMES:
@@ -246,7 +246,7 @@ def straight_road(net: Path, *, limit: float = 13.89) -> None:
         f'<edges><edge id="in" from="a" to="light" numLanes="1" speed="{limit}"/>'
         f'<edge id="out" from="light" to="b" numLanes="1" speed="{limit}"/></edges>'
     )
-    _tool("netconvert", "-n", nodes, "-e", edges, "-o", net, "--no-warnings")
+    run_tool("netconvert", "-n", nodes, "-e", edges, "-o", net, "--no-warnings")
 
 
 def saturation_flow(
