@@ -702,8 +702,11 @@ def _rank_priorities(
             return ()
         source = f"way {places.leg_way(network, low[0])}"
         said = top > max(street.rank for street in CLASSES.values())
-        what = "the priority road" if said else "the more important street"
-        reason = f"gives way to {what}: no sign says who does"
+        reason = (
+            "gives way to the priority road: no sign says who does"
+            if said
+            else "gives way to the more important street: no sign says who does"
+        )
         element = f"junction {number} > road {plans[low[0].street].id}"
         drawn.note(ElementOutcome.GUESSED, element, reason, 0.9 if said else 0.6, source)
     pairs = {
