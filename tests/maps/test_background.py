@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import io
 import math
+import re
+import sqlite3
 import struct
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +27,7 @@ from odscen.maps.background import (
     parse_world_file,
     place_picture,
 )
+from odscen.maps.store import Workspace
 from odscen.opendrive.parse import parse
 
 MAPS = Path(__file__).parents[2] / "maps"
@@ -176,3 +180,90 @@ def test_a_tiff_of_a_few_kilobytes_that_unpacks_to_gigabytes_ends_a_child_alone(
     points = [PicturePoint(0, 0, 0, 0), PicturePoint(60, 0, 60, 0)]
     with pytest.raises(LimitError, match=r"reading the picture needs more than 0\.35 GB"):
         place_picture(out.getvalue(), source="p.tif", header=HEADER, bounds=BOUNDS, points=points)
+
+
+# ------------------------------------------------------------------------------------------ tiles
+
+
+def tile_of(lat: float, lon: float, zoom: int) -> tuple[int, int]:
+    """Column and row from the north, by the formula of OpenStreetMap's wiki (Slippy map)."""
+    n = 2**zoom
+    row = (1.0 - math.asinh(math.tan(math.radians(lat))) / math.pi) / 2.0 * n
+    return int((lon + 180.0) / 360.0 * n), int(row)
+
+
+def colour_tile(red: int, green: int, size: int = 256) -> bytes:
+    out = io.BytesIO()
+    Image.new("RGB", (size, size), (red % 256, green % 256, 7)).save(out, "PNG")
+    return out.getvalue()
+
+
+def georeferenced_map(tmp_path: Path) -> tuple[Workspace, str]:
+    text = (MAPS / "bus_street.xodr").read_text(encoding="utf-8")
+    head = re.sub(r"<geoReference>.*?</geoReference>", "", text, flags=re.DOTALL)
+    reference = f"<geoReference><![CDATA[{LOCAL}]]></geoReference>"
+    placed = re.sub(r"(<header[^>]*?)(/>|>)", lambda m: m[1] + ">" + reference + (
+        "</header>" if m[2] == "/>" else ""), head, count=1)  # fmt: skip
+    (tmp_path / "placed.xodr").write_text(placed, encoding="utf-8")
+    workspace = Workspace.open(tmp_path / "workspace")
+    workspace.add_map(tmp_path / "placed.xodr")
+    return workspace, "placed"
+
+
+@pytest.mark.parametrize("kind", ["folder", "mbtiles"])
+def test_tiles_lie_where_web_mercator_has_them(tmp_path: Path, kind: str) -> None:
+    workspace, name = georeferenced_map(tmp_path)
+    x0, y0, x1, y1 = workspace.map(name).statistics().bounds
+    to_degrees = pyproj.Transformer.from_crs(LOCAL, "EPSG:4326", always_xy=True)
+    zoom = 18
+    west, south = to_degrees.transform(x0 - 30.0, y0 - 30.0)
+    east, north = to_degrees.transform(x1 + 30.0, y1 + 30.0)
+    (first, top), (last, bottom) = tile_of(north, west, zoom), tile_of(south, east, zoom)
+    tiles = {
+        (column, row): colour_tile(column, row)
+        for column in range(first - 1, last + 2)
+        for row in range(top - 1, bottom + 2)
+    }
+    if kind == "folder":
+        source = tmp_path / "tiles"
+        for (column, row), content in tiles.items():
+            file = source / str(zoom) / str(column) / f"{row}.png"
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
+    else:
+        source = tmp_path / "tiles.mbtiles"
+        with closing(sqlite3.connect(source)) as connection:
+            connection.execute(
+                "CREATE TABLE tiles (zoom_level INT, tile_column INT, tile_row INT, tile_data BLOB)"
+            )
+            rows = [(zoom, c, 2**zoom - 1 - r, content) for (c, r), content in tiles.items()]
+            connection.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)", rows)
+            connection.commit()
+    under = workspace.set_background(name, source)
+    picture = Image.open(under.path).convert("RGB")
+    a, b, c, d, e, f = under.affine
+    for x, y in [(x0, y0), (x1, y1), ((x0 + x1) / 2, (y0 + y1) / 2), (x0, y1)]:
+        column, row = np.linalg.solve([[a, b], [d, e]], [x - c, y - f])
+        lon, lat = to_degrees.transform(x, y)
+        there = tile_of(lat, lon, zoom)
+        assert picture.getpixel((int(column), int(row))) == (there[0] % 256, there[1] % 256, 7)
+
+
+def test_tiles_that_are_damaged_or_elsewhere_are_refused(tmp_path: Path) -> None:
+    workspace, name = georeferenced_map(tmp_path)
+    (tmp_path / "elsewhere" / "18" / "0").mkdir(parents=True)
+    (tmp_path / "elsewhere" / "18" / "0" / "0.png").write_bytes(colour_tile(1, 2))
+    with pytest.raises(InputError, match=r"elsewhere: no tile lies under the map"):
+        workspace.set_background(name, tmp_path / "elsewhere")
+    (tmp_path / "no.mbtiles").write_bytes(b"no database at all, and longer than a header" * 9)
+    with pytest.raises(InputError, match=r"no.mbtiles: no MBTiles file"):
+        workspace.set_background(name, tmp_path / "no.mbtiles")
+    lon, lat = pyproj.Transformer.from_crs(LOCAL, "EPSG:4326", always_xy=True).transform(0.0, 0.0)
+    column, row = tile_of(lat, lon, 3)
+    (tmp_path / "odd" / "3" / str(column)).mkdir(parents=True)
+    file = tmp_path / "odd" / "3" / str(column) / f"{row}.png"
+    for content, words in [(colour_tile(1, 2, 100), "100 x 100"), (b"no picture", "no PNG")]:
+        file.write_bytes(content)
+        with pytest.raises(InputError, match=words):
+            workspace.set_background(name, tmp_path / "odd")
+    assert workspace.background(name) is None

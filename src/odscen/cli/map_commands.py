@@ -286,7 +286,10 @@ def background(
     name: Annotated[str, typer.Argument(metavar="MAP")],
     picture: Annotated[
         Path | None,
-        typer.Argument(help="PNG, JPEG or TIFF. (default: show what MAP has)", metavar="PICTURE"),
+        typer.Argument(
+            help="PNG, JPEG or TIFF, or tiles: a folder or .mbtiles. (default: show what MAP has)",
+            metavar="PICTURE",
+        ),
     ] = None,
     world: Annotated[
         Path | None,

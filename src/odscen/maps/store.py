@@ -36,6 +36,7 @@ from odscen.maps.folder_names import check_name, is_name, name_from_file
 from odscen.maps.importers.base import DETECTED
 from odscen.maps.map_entry import INFO_FILE, XODR_FILE, BrokenMap, MapEntry, read_entry
 from odscen.maps.map_files import read_map_file
+from odscen.maps.map_tiles import MERCATOR, are_tiles, join_tiles
 from odscen.simulators.assets import assets_in
 
 if TYPE_CHECKING:
@@ -534,7 +535,8 @@ class Workspace:
         Parameters
         ----------
         picture
-            PNG, JPEG or TIFF: a file, whose world file is looked for beside it, or its content.
+            PNG, JPEG or TIFF: a file, whose world file is looked for beside it, or its content; or
+            tiles of a web map, a folder or an MBTiles file, see :mod:`odscen.maps.map_tiles`.
         source
             Name that is shown; of the file if not given.
         world
@@ -552,17 +554,22 @@ class Workspace:
         InputError
             If the picture cannot be read or is too large, or its place is not known.
         MissingDependencyError
-            Of a TIFF, if Pillow is not installed.
+            Of a TIFF or tiles, if Pillow is not installed.
         WorkspaceError
             If it cannot be written.
         """
         from odscen.opendrive.parse import parse
 
         entry = self.stored(name)
+        header = parse(entry.read("xodr"), file=entry.name).header
+        bounds = entry.statistics().bounds
         if isinstance(picture, bytes):
             content, file = picture, None
+        elif are_tiles(file := as_path(picture)):
+            with in_file(file.name):
+                content, world = join_tiles(file, header, bounds)
+            crs = MERCATOR
         else:
-            file = as_path(picture)
             content = read_given(file, most=MOST_BYTES)
         if file is not None and world is None and (beside := find_world_file(file)) is not None:
             world = read_given_text(beside)
@@ -570,8 +577,8 @@ class Workspace:
             content, placed = place_picture(
                 content,
                 source=source or (file.name if file else "picture"),
-                header=parse(entry.read("xodr"), file=entry.name).header,
-                bounds=entry.statistics().bounds,
+                header=header,
+                bounds=bounds,
                 world=world,
                 crs=crs,
                 points=points,
