@@ -183,8 +183,9 @@ def _write_weights(folder: Path) -> None:
     agent = SignalAgent(new_network(len(FEATURES), 32, 1, rng), {"seed": 2})
     (folder / "lights.npz").write_bytes(agent.to_bytes())
     from odscen.learning.reference import traffic_model
+    from odscen.learning.reference.model_training import binned_statistics
 
     contexts = np.ones((traffic_model._CONTEXTS, len(traffic_model.VEHICLES)))
     occupied, speed = new_network(8, 32, 1, rng), new_network(14, 32, traffic_model.CLASSES, rng)
-    model = TrafficModel(occupied, speed, contexts, {"maps": ["a"]})
+    model = TrafficModel(occupied, speed, contexts, {"maps": ["a"]}, binned_statistics(()))
     (folder / "traffic.npz").write_bytes(model_bytes(model))

@@ -5,18 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from odscen.learning.reference.binned_statistics import BINS, BinnedStatistics, place_binned
 from odscen.learning.reference.site_features import site_of
 from odscen.learning.traffic_metrics import (
-    BINS,
     FEATURES,
-    BinnedStatistics,
     TrafficScene,
     divergence,
     frechet_distance,
     interval,
     mean_discrepancy,
     novelty,
-    place_binned,
     scene_features,
 )
 from odscen.learning.traffic_snapshots import no_lights

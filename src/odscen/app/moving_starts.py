@@ -18,9 +18,8 @@ from odscen.base.atomic_folders import scratch_folder
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.learning.fill import VEHICLES
+from odscen.learning.reference.binned_statistics import NOBODY, PlacedTraffic
 from odscen.learning.reference.reference_generator import (
-    NOBODY,
-    PlacedTraffic,
     draw_desired_speeds,
     fill_with_walkers,
     onward_goals,

@@ -5,13 +5,16 @@ from __future__ import annotations
 import io
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from odscen.app.learned.learned_maps import whole_map
 from odscen.base.categories import DEFAULT_BODY
 from odscen.base.errors import InputError
 from odscen.learning.fill import VEHICLES, FillRequest, checked_fill
+from odscen.learning.reference.gap_states import gap_states
 from odscen.learning.reference.reference_generator import (
     WEIGHTS,
     ReferenceGenerator,
@@ -24,6 +27,7 @@ from odscen.learning.reference.traffic_model import (
     speed_class,
 )
 from odscen.learning.traffic_snapshots import LightView, SignalAhead, no_lights
+from odscen.maps.store import Workspace
 from odscen.scenario.document.sampling_config import SamplingConfig
 from odscen.scenario.placing.region import Region, Usable
 from odscen.scenario.sampling.sampler import wanted_users
@@ -58,6 +62,21 @@ def test_weights_of_another_version_are_refused_with_both_versions() -> None:
     np.savez(buffer, allow_pickle=False, **arrays | {"about": np.array([json.dumps(head)])})
     with pytest.raises(InputError, match=f"version is {VERSION - 1}; .* reads {VERSION}"):
         model_from_bytes(buffer.getvalue(), file="old.npz")
+
+
+def test_weights_whose_statistics_are_no_counts_are_refused() -> None:
+    with np.load(io.BytesIO(model_bytes(shipped_model()))) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    rate = arrays["statistics_rate"]
+    for bad, words in (
+        (rate[:-1], r"statistics rate have shape \(143,\), not \(144,\)"),
+        (-rate, "statistics rate are no numbers from 0"),
+        (np.full_like(rate, np.nan), "statistics rate are no numbers from 0"),
+    ):
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **arrays | {"statistics_rate": bad})
+        with pytest.raises(InputError, match=words):
+            model_from_bytes(buffer.getvalue(), file="bad.npz")
 
 
 @pytest.mark.slow
@@ -109,14 +128,44 @@ def test_more_are_stopped_before_a_red_light_of_a_junction_than_before_a_green_o
 def test_a_road_without_a_junction_with_ten_vehicles_is_said_to_be_unlike_the_data(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
+    """Vehicles are placed by binned statistics then, as many as are wanted, and move."""
     ReferenceGenerator().fill(GRAPH, request(2), np.random.default_rng(0))
     assert not caplog.records
     for seed in range(3):
-        ReferenceGenerator().fill(GRAPH, request(10), np.random.default_rng(seed))
+        fill = ReferenceGenerator().fill(GRAPH, request(10), np.random.default_rng(seed))
+        assert len(fill.node) == 10
+        assert fill.initial_speed is not None
+        assert (fill.initial_speed > 0.1).mean() >= 0.7
     assert {record.name for record in caplog.records} == {"odscen"}
     times = [float(re.findall(r"traffic ([\d.]+) times", one)[0]) for one in caplog.messages]
     assert times
     assert all(2.7 <= time <= 8.0 for time in times)
+    assert all("placed by binned statistics" in words for words in caplog.messages)
+
+
+@pytest.mark.slow
+def test_a_motorway_with_a_merge_and_nothing_else_gets_no_queues_without_a_reason(
+    shared_maps: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """In SUMO hardly one vehicle has a stopped one right ahead; the model alone gives it 0.9."""
+    store = Workspace.open(tmp_path)
+    store.add_map(shared_maps / "esmini" / "highway_merge.xodr")
+    on = whole_map(store.map("highway_merge"))
+    lights = no_lights(len(on.region.graph.lanes.lanes.keys))
+    queues = []
+    for seed in range(8):
+        given = on.request(30, lights, seed=seed)
+        fill = ReferenceGenerator().fill(on.region.graph, given, np.random.default_rng(seed))
+        assert len(fill.node) == 30
+        assert fill.initial_speed is not None
+        names = [str(category) for category in VEHICLES]
+        category = np.array([names.index(name) for name in fill.category])
+        states = gap_states(
+            on.learned.site.strips, node=fill.node, category=category, speed=fill.initial_speed
+        )
+        queues.append(states.queue[fill.node])
+    assert len(caplog.records) >= 6
+    assert np.concatenate(queues).mean() < 0.3
 
 
 def test_nobody_is_placed_where_nobody_is_wanted() -> None:

@@ -24,15 +24,14 @@ from odscen.base.atomic_folders import scratch_folder
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
 from odscen.learning.fill import VEHICLES, Fill, checked_fill
-from odscen.learning.reference.model_training import placed
+from odscen.learning.reference.binned_statistics import place_binned
+from odscen.learning.reference.model_training import binned_statistics, placed
 from odscen.learning.reference.reference_generator import ReferenceGenerator, names_of
 from odscen.learning.traffic_metrics import (
     MEASURES,
     TrafficScene,
-    binned_statistics,
     interval,
     novelty,
-    place_binned,
     scene_features,
     together,
 )

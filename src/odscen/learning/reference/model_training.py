@@ -9,6 +9,12 @@ import numpy as np
 
 from odscen.base.errors import InputError
 from odscen.learning.fill import VEHICLES
+from odscen.learning.reference.binned_statistics import (
+    BINS,
+    RATIOS,
+    BinnedStatistics,
+    bins_of,
+)
 from odscen.learning.reference.gap_states import gap_states
 from odscen.learning.reference.site_features import (
     junction_columns,
@@ -25,9 +31,10 @@ from odscen.learning.reference.traffic_model import (
     trained,
     with_category,
 )
+from odscen.learning.traffic_snapshots import STOPPED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from odscen.base.arrays import BoolArray, FloatArray, IntArray
     from odscen.learning.fill import Array
@@ -157,7 +164,13 @@ def train_model(
         decay=settings.decay,
     )
     said = {"seed": settings.seed, "epochs": settings.epochs, "vehicles": len(rows.speed)}
-    return TrafficModel(occupied, speed, _category_shares(rows), {**said, **(about or {})})
+    return TrafficModel(
+        occupied,
+        speed,
+        _category_shares(rows),
+        {**said, **(about or {})},
+        binned_statistics(examples),
+    )
 
 
 class _Rows(NamedTuple):
@@ -251,3 +264,26 @@ def _category_shares(rows: _Rows) -> FloatArray:
     total = counts.sum(axis=0) / counts.sum()
     smoothed = counts + 20.0 * total + 1e-3
     return np.asarray(smoothed / smoothed.sum(axis=1, keepdims=True))
+
+
+def binned_statistics(examples: Iterable[Example]) -> BinnedStatistics:
+    """Count vehicles of snapshots in bins."""
+    nodes = np.zeros(BINS)
+    speeds = np.zeros((BINS, len(RATIOS) - 1))
+    categories = np.zeros((BINS, len(VEHICLES)))
+    for example in examples:
+        site, snapshot = example.of.site, example.snapshot
+        bins = bins_of(site, snapshot.lights)
+        nodes += np.bincount(bins[example.of.allowed.any(axis=0)], minlength=BINS)
+        good = placed(example)
+        node = snapshot.node[good]
+        ratio = snapshot.speed[good] / site.limit[node]
+        ratio = np.where(snapshot.speed[good] < STOPPED, 0.0, np.maximum(ratio, 0.01))
+        kind = np.clip(np.digitize(ratio, RATIOS) - 1, 0, len(RATIOS) - 2)
+        np.add.at(speeds, (bins[node], kind), 1.0)
+        np.add.at(categories, (bins[node], snapshot.category[good]), 1.0)
+    all_speeds, all_categories = speeds.sum(axis=0), categories.sum(axis=0)
+    speeds += 1e-3 * all_speeds / max(all_speeds.sum(), 1.0)
+    categories += 1e-3 * all_categories / max(all_categories.sum(), 1.0)
+    rate = speeds.sum(axis=1) / np.maximum(nodes, 1.0)
+    return BinnedStatistics(rate, speeds, categories)

@@ -29,6 +29,7 @@ from odscen.base.errors import InputError, in_file
 from odscen.base.given_arrays import arrays_from_npz
 from odscen.base.stored_files import documents
 from odscen.learning.fill import VEHICLES
+from odscen.learning.reference.binned_statistics import BinnedStatistics
 from odscen.learning.traffic_snapshots import STOPPED
 
 if TYPE_CHECKING:
@@ -199,7 +200,7 @@ def _draw_batches(count: int, epochs: int, rng: np.random.Generator) -> Iterator
             yield order[start : start + _BATCH]
 
 
-VERSION = 4
+VERSION = 5
 STEP = 0.05
 """Of the ratio of speed to limit."""
 CLASSES = 29
@@ -223,12 +224,15 @@ class TrafficModel:
         Shape ``(6, 6)``: share of each category by :func:`context`.
     about
         How it was trained; values that JSON can hold.
+    statistics
+        What is placed by where the model is no good.
     """
 
     occupied: SmallNetwork
     speed: SmallNetwork
     categories: FloatArray
     about: dict[str, Any]
+    statistics: BinnedStatistics
 
 
 def context(outer: BoolArray, limit: FloatArray) -> IntArray:
@@ -273,6 +277,7 @@ def model_bytes(model: TrafficModel) -> bytes:
     arrays: dict[str, Any] = {"about": np.array([text]), "categories": model.categories}
     for name, network in (("occupied", model.occupied), ("speed", model.speed)):
         arrays |= {f"{name}_{k}": weights for k, weights in enumerate(network.weights)}
+    arrays |= model.statistics.to_arrays()
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
@@ -290,6 +295,8 @@ def model_from_bytes(data: bytes, *, file: str) -> TrafficModel:
     with in_file(file), documents("a model of traffic", RecursionError):
         head = json.loads(str(arrays["about"][0]))
         about, version = head["about"], head["version"]
+        if version != VERSION:
+            raise InputError(f"version is {version}; this odscen reads {VERSION}")
         occupied, speed = (
             SmallNetwork.from_arrays(
                 arrays, f"{name}_", inputs=arrays[f"{name}_0"].shape[0], outputs=outputs
@@ -304,6 +311,5 @@ def model_from_bytes(data: bytes, *, file: str) -> TrafficModel:
         categories = arrays["categories"].astype(np.float64).reshape(_CONTEXTS, len(VEHICLES))
         if not ((categories >= 0.0) & (categories <= 1.0)).all():
             raise InputError("shares of categories are from 0 to 1")
-    if version != VERSION:
-        raise InputError(f"version is {version}; this odscen reads {VERSION}", file=file)
-    return TrafficModel(occupied, speed, categories, about)
+        statistics = BinnedStatistics.from_arrays(arrays)
+    return TrafficModel(occupied, speed, categories, about, statistics)
