@@ -641,3 +641,18 @@ value="2"/></SpeedActionTarget></SpeedAction></LongitudinalAction></PrivateActio
     path = next(part.path for item in first.then for part in item.parts if part.path is not None)
     assert path.points == ((600.0, -4.75),)
     assert "it walks on along its lane" in reasons(found, "approximated")
+
+
+def test_a_speed_profile_that_is_alone_at_first_begins_at_its_first_speed(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    begin = PROFILE.replace('time="2"', 'time="0"')
+    more = f'<Private entityRef="Other">{private(begin)}</Private>'
+    found = read(workspace, tmp_path, scene(Actions=more))
+    other = next(one for one in found.scenario.actors if one.id == "Other")
+    assert other.initial_speed == 10.0
+    done = run(workspace, found.scenario, settings=RunSettings(until=2.5), name="r", out=tmp_path)
+    rows = done.trajectories()
+    motion = rows.filter((rows["id"] == "Other") & (rows["time"] > 0.05))
+    wanted = np.interp(motion["time"].to_numpy(), [0.0, 3.0], [10.0, 4.0])
+    assert motion["speed"].to_numpy() == pytest.approx(wanted, abs=0.25)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from lxml.etree import _Element
 
+    from odscen.base.arrays import Int32Array, IntArray
     from odscen.formats.openscenario_import.import_report import ImportReport
     from odscen.formats.openscenario_import.places.map_points import MovingFrame
     from odscen.lanegraph.graphs import MapGraph
@@ -192,7 +193,14 @@ class PositionReader:
         hdg = float(lanes.hdg[node])
         return dx * math.cos(hdg) + dy * math.sin(hdg)
 
-    def _node_and_rest(self, node: int, metres: float) -> tuple[int, float]:
+    def straight_on(self, node: int, metres: float) -> tuple[int, list[int]]:
+        """Node as of :meth:`along`, and a node on each lane that is taken at a fork."""
+        forks: list[int] = []
+        return self._node_and_rest(node, metres, forks)[0], forks
+
+    def _node_and_rest(
+        self, node: int, metres: float, forks: list[int] | None = None
+    ) -> tuple[int, float]:
         """Node nearest to so many metres on along the lanes, and the metres from there."""
         lanes = self.graph.lanes
         ends = (lanes.source, lanes.target) if metres >= 0 else (lanes.target, lanes.source)
@@ -201,15 +209,28 @@ class PositionReader:
             edges = np.flatnonzero((ends[0] == node) & (lanes.relation == Relation.SUCCESSOR))
             if edges.size == 0:
                 break
-            turn = np.cos(lanes.hdg[ends[1][edges]] - lanes.hdg[node])
-            edge = int(edges[int(np.argmax(turn))])
+            edge = self._straightest(node, edges, ends[1])
             following = int(ends[1][edge])
             if following in seen or left < 0.5 * float(lanes.length[edge]):
                 break
             left -= float(lanes.length[edge])
             node = following
             seen.add(node)
+            if forks is not None and edges.size > 1:
+                forks.append(node)
         return node, left if metres >= 0 else -left
+
+    def _straightest(self, node: int, edges: IntArray, others: Int32Array) -> int:
+        """Edge of several whose lane, such as one in a junction, turns least from its begin on."""
+        lanes = self.graph.lanes
+        if edges.size == 1:
+            return int(edges[0])
+        first = lanes.lanes.first_node
+        rows = lanes.lane[others[edges]]
+        ends = np.stack([first[rows], first[rows + 1] - 1])
+        near = np.hypot(lanes.x[ends] - lanes.x[node], lanes.y[ends] - lanes.y[node])
+        far = ends[np.argmax(near, axis=0), np.arange(edges.size)]
+        return int(edges[int(np.argmax(np.cos(lanes.hdg[far] - lanes.hdg[node])))])
 
     def beside(self, node: int, by: int) -> int | None:
         """Node abreast whose lane id differs by so many, 0 left out; ``None`` if there is none."""

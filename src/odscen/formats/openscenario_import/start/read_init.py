@@ -13,10 +13,11 @@ from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.places.map_points import MapPoint
 from odscen.formats.openscenario_import.places.read_trajectories import read_trajectory
 from odscen.formats.openscenario_import.story.global_actions import tell_unread
+from odscen.formats.openscenario_import.story.read_actions import FOLLOWING
 from odscen.formats.openscenario_import.story.read_motions import put_there
 from odscen.formats.openscenario_import.story.read_storyboard import refuse_beyond_bounds
 from odscen.formats.openscenario_import.traced_numbers import TracedNumber
-from odscen.lanegraph.query import node_id, walk_node_id
+from odscen.lanegraph.query import node_id, node_index, walk_node_id
 from odscen.lanegraph.shortest_paths import Router
 from odscen.scenario.document.problems import validated
 from odscen.scenario.document.scenario_document import Actor
@@ -130,6 +131,8 @@ _BESIDE: Final = 10.0
 """Metres that an actor can be beside its lane."""
 _FAR: Final = 100_000.0
 """Metres after which a way straight on counts as long enough."""
+_MOST_VIA: Final = 49
+"""Places that a route leads through at most."""
 
 
 Made = dict[str, Any]
@@ -144,6 +147,8 @@ class ActorPlaces:
         self._report = report
         self._positions = positions
         self._bodies: list[tuple[MapPoint, Body]] = []
+        self.forks = False
+        """Whether the way straight on of the last vehicle has forks."""
 
     def leave_room(self, entity: ReadEntity, made: dict[str, Any], taken: set[str]) -> None:
         """Let an actor start behind one whose node or ground it would have."""
@@ -291,13 +296,43 @@ class ActorPlaces:
         if math.cos(centre.hdg - hdg) < 0.0 and not led:
             words = "it drives the way of its lane: it heads against it, and no other one is near"
             self._report.mark(entity.element, "approximated", words)
-        goal = self._positions.along(node, _FAR)
         return {
             "spawn": str(node_id(graph, node)),
-            "goal": str(node_id(graph, goal)),
+            **self._way_straight_on(node),
             "lateral_offset": round(left, 3),
             **({"longitudinal_offset": ahead} if ahead else {}),
         }
+
+    def _way_straight_on(self, node: int) -> Made:
+        """Goal of who has none, straight on; through the lanes there if no shorter way does."""
+        graph = self._positions.graph
+        goal, forks = self._positions.straight_on(node, _FAR)
+        self.forks = bool(forks)
+        if len(forks) > _MOST_VIA:
+            goal, forks = forks[_MOST_VIA], forks[:_MOST_VIA]
+        found: Made = {"goal": str(node_id(graph, goal))}
+        if forks:
+            shortest = set(graph.lanes.lane[Router(graph).path(node, goal)].tolist())
+            if not shortest.issuperset(graph.lanes.lane[forks].tolist()):
+                found["via"] = [str(node_id(graph, fork)) for fork in forks]
+        return found
+
+    def through(self, made: Made, route: list[str]) -> Made:
+        """Places that the route of a file leads through, as far as those ahead can be reached.
+
+        A route may begin behind where the actor starts, on its road.
+        """
+        graph, lanes = self._positions.graph, self._positions.graph.lanes
+        rows = [node_index(graph, name) for name in (made["spawn"], *route, made["goal"])]
+        roads = [lanes.lanes.keys[int(lanes.lane[row])].road for row in rows]
+        while len(rows) > 2 and roads[1] == roads[0]:
+            del rows[1], roads[1]
+        router = Router(graph)
+        if len(rows) - 2 > _MOST_VIA or not all(
+            bool(router.reachable(one)[other]) for one, other in itertools.pairwise(rows)
+        ):
+            return {}
+        return {"via": [str(node_id(graph, row)) for row in rows[1:-1]]} if len(rows) > 2 else {}
 
 
 # ----------------------------------------------------------------------------- what is at first
@@ -495,13 +530,17 @@ class InitReader:
     ) -> dict[str, Any]:
         centre = start.moved(entity.ahead)
         then = self._then.get(entity.id, [])
-        changes = [action["speed"] for action in then if "speed" in action]
+        each = [one for action in then for one in action.get(FOLLOWING, [action])]
+        changes = [action["speed"] for action in each if "speed" in action]
         speed = changes[-1]["to"] if changes else 0.0
         kept = [action["keep_gap"]["to"] for action in then if "keep_gap" in action]
         if kept and not changes and self._story.actions is not None:
             speed = self._story.actions.speeds.get(kept[-1], 0.0)  # ... of whom it keeps a gap to
         # What takes time begins from a standstill, which entities are at before the first action.
-        first = speed if all(change.get("shape") == "step" for change in changes) else 0.0
+        steps = itertools.takewhile(lambda change: change.get("shape") == "step", changes)
+        at_once = [change["to"] for change in steps]
+        profile = len(each) > len(then)
+        first = at_once[-1] if at_once and (profile or len(at_once) == len(changes)) else 0.0
         led = [action["path"] for action in then if "path" in action]
         if self._story.actions is not None and entity.id in self._story.actions.reversing:
             for path in led:
@@ -525,7 +564,15 @@ class InitReader:
             made |= self._places.vehicle(entity, centre, led=stands or bool(led))
             made |= {"style": STEADY, "initial_speed": first}
             goals = [action["goal"]["to"] for action in then if "goal" in action]
-            made |= {"goal": self._places.reached(entity, made, goals[-1])} if goals else {}
+            if not goals and self._places.forks:
+                words = "straight on at junctions and forks, as the file gives no route at first"
+                self._report.mark(entity.element, "approximated", words)
+            if goals and (goal := self._places.reached(entity, made, goals[-1])) != made["goal"]:
+                made["goal"] = goal
+                made.pop("via", None)
+                actions = self._story.actions
+                route = actions.routes.get(entity.id, []) if actions is not None else []
+                made |= self._places.through(made, route)
             drivers = [action["drive"]["by"] for action in then if "drive" in action]
             driver = drivers[-1] if drivers else "story"
             made |= {"driver": driver} if driver == "story" and not free else {}

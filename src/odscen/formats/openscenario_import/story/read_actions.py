@@ -106,8 +106,9 @@ class ActionReader:
     """Reads actions of one entity after another.
 
     ``speeds`` (m/s), ``lanes`` (ids) and ``offsets`` (m) are the last ones that each actor was
-    asked for; ``reversing`` are those that follow a trajectory at first at a negative one. ``own``
-    says whether odscen wrote the file: its controllers are what drives without rules.
+    asked for; ``reversing`` are those that follow a trajectory at first at a negative one, and
+    ``routes`` the nodes that routes at first lead through before their last one. ``own`` says
+    whether odscen wrote the file: its controllers are what drives without rules.
     """
 
     conditions: ConditionReader
@@ -116,6 +117,7 @@ class ActionReader:
     offsets: dict[str, float] = field(default_factory=dict)
     own: bool = False
     reversing: set[str] = field(default_factory=set)
+    routes: dict[str, list[str]] = field(default_factory=dict)
 
     def actions(self, element: _Element, entity: ReadEntity) -> list[Made]:
         """Actions of a rule that a ``PrivateAction`` is; none if it is ignored.
@@ -505,17 +507,28 @@ def _read_profile(read: ActionReader, kind: _Element, entity: ReadEntity) -> Mad
     return steps[0] if len(steps) == 1 else {FOLLOWING: steps}
 
 
-def _read_goal(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
+def _read_goal(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     positions, report = read.conditions.positions, read.conditions.report
     places = list(kind.iterfind(".//Waypoint/Position")) or list(kind.iterchildren("Position"))
     if not places:
         raise RefusedError(kind, "a route without places")
+    first = any(True for _ in kind.iterancestors("Init"))
+    words = (
+        "through its places in their order, by the shortest ways, if those lead there"
+        if first
+        else "only the last place of a route is a goal"
+    )
     for element in kind.iter("Route", "Waypoint"):
-        report.mark(element, "approximated", "only the last place of a route is a goal")
-    report.mark(places[-1], "taken")
-    point = positions.point(places[-1])
-    node = positions.node_near(point) if point.node is None else point.node
-    return {"goal": {"to": str(node_id(positions.graph, node))}}
+        report.mark(element, "approximated", words)
+    used = places if first else places[-1:]
+    nodes = []
+    for place in used:
+        report.mark(place, "taken")
+        point = positions.point(place)
+        node = positions.node_near(point) if point.node is None else point.node
+        nodes.append(str(node_id(positions.graph, node)))
+    read.routes[entity.id] = nodes[:-1]
+    return {"goal": {"to": nodes[-1]}}
 
 
 def _read_arrive(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:

@@ -393,7 +393,8 @@ class StoryReader:
         put = list(itertools.takewhile(lambda one: {"appear", "replay"} & one.keys(), then))
         rest = then[len(put) :]
         if put and rest:
-            groups = [[*put, *(rest if len(rest) == 1 else [{"together": rest}])]]
+            after = rest[0].get(FOLLOWING, rest) if len(rest) == 1 else [{"together": rest}]
+            groups = [[*put, *after]]
         else:
             groups = [action.get(FOLLOWING, [action]) for action in then]
         made = [{"actor": actor, "when": ALWAYS, "then": group} for group in groups]

@@ -125,7 +125,8 @@ def _read_entity(report: ImportReport, thing: _Element, own: str) -> ReadEntity 
     else:
         category = _CATEGORIES.get(kind) or _NEAREST.get(kind)
         if kind in _NEAREST:
-            report.mark(thing, "approximated", f"a {kind} is a {_NEAREST[kind]}")
+            words = f"a {kind} is a {_NEAREST[kind]} by itself: nothing tows it"
+            report.mark(thing, "approximated", words)
     if category is None:
         report.mark(thing, "refused", f"vehicles of category {kind!r}")
         return None
