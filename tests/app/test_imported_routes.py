@@ -61,3 +61,46 @@ def test_a_route_leads_through_its_places_but_for_the_one_behind(tmp_path: Path)
     assert [where(node)[0] for node in car.via] == pytest.approx([30.0], abs=2.5)
     assert where(car.goal)[0] == pytest.approx(60.0, abs=2.5)
     assert [one for one in found.problems if one.severity == "error"] == []
+
+
+RAMP = """<OpenDRIVE><header revMajor="1" revMinor="4"/>
+<road name="" length="100" id="7" junction="-1"><link><successor elementType="road"
+ elementId="8" contactPoint="start"/></link><planView><geometry s="0" x="0" y="-3.5" hdg="0"
+ length="100"><line/></geometry></planView><lanes><laneSection s="0"><center>
+<lane id="0" type="none" level="false"/></center><right><lane id="-1" type="driving"
+ level="false"><link><successor id="-2"/></link>
+<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>
+<road name="" length="400" id="8" junction="-1"><link><predecessor elementType="road"
+ elementId="7" contactPoint="end"/></link><planView><geometry s="0" x="100" y="0" hdg="0"
+ length="400"><line/></geometry></planView><lanes><laneSection s="0"><center>
+<lane id="0" type="none" level="false"/></center><right>
+<lane id="-1" type="driving" level="false"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+<lane id="-2" type="driving" level="false"><link><predecessor id="-1"/></link>
+<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+<lane id="-3" type="driving" level="false"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+</right></laneSection></lanes></road></OpenDRIVE>"""
+CHANGE = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1">
+<Actors selectTriggeringEntities="false"><EntityRef entityRef="car"/></Actors><Maneuver name="m">
+<Event name="merge" priority="parallel"><Action name="x"><PrivateAction><LateralAction>
+<LaneChangeAction><LaneChangeActionDynamics dynamicsShape="sinusoidal" dynamicsDimension="time"
+ value="3"/><LaneChangeTarget><AbsoluteTargetLane value="{}"/></LaneChangeTarget></LaneChangeAction>
+</LateralAction></PrivateAction></Action><StartTrigger><ConditionGroup><Condition name="c" delay="0"
+ conditionEdge="none"><ByValueCondition><SimulationTimeCondition value="8" rule="greaterThan"/>
+</ByValueCondition></Condition></ConditionGroup></StartTrigger></Event></Maneuver></ManeuverGroup>
+</Act></Story><StopTrigger"""
+
+
+@pytest.mark.parametrize(("lane", "by"), [(-3, -1), (-1, None)])
+def test_a_lane_that_the_road_of_the_start_lacks_is_that_of_the_next_one_that_has_it(
+    tmp_path: Path, lane: int, by: int | None
+) -> None:
+    (tmp_path / "ramp.xodr").write_text(RAMP, encoding="utf-8")
+    text = FILE.format(route="").replace("signal_crossing", "ramp")
+    text = text.replace('x="-60" y="-1.75"', 'x="20" y="-5.25"')
+    text = text.replace("<StopTrigger", CHANGE.format(lane), 1)
+    (tmp_path / "merge.xosc").write_text(text, encoding="utf-8")
+    found = import_file(Workspace.open(tmp_path / "workspace"), tmp_path / "merge.xosc")
+    assert found.scenario is not None
+    (rule,) = (one for one in found.scenario.rules if one.id == "merge")
+    (action,) = rule.then
+    assert (action.lane.by if action.lane else None) == by

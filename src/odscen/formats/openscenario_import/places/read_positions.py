@@ -198,8 +198,18 @@ class PositionReader:
         forks: list[int] = []
         return self._node_and_rest(node, metres, forks)[0], forks
 
+    def nodes_on(self, node: int, metres: float) -> list[int]:
+        """Nodes that are passed by :meth:`along`, from the first one on."""
+        passed: list[int] = [node]
+        self._node_and_rest(node, metres, passed=passed)
+        return passed
+
     def _node_and_rest(
-        self, node: int, metres: float, forks: list[int] | None = None
+        self,
+        node: int,
+        metres: float,
+        forks: list[int] | None = None,
+        passed: list[int] | None = None,
     ) -> tuple[int, float]:
         """Node nearest to so many metres on along the lanes, and the metres from there."""
         lanes = self.graph.lanes
@@ -216,6 +226,8 @@ class PositionReader:
             left -= float(lanes.length[edge])
             node = following
             seen.add(node)
+            if passed is not None:
+                passed.append(node)
             if forks is not None and edges.size > 1:
                 forks.append(node)
         return node, left if metres >= 0 else -left

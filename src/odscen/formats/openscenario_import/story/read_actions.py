@@ -60,6 +60,33 @@ def start_lane(conditions: ConditionReader, element: _Element, actor: str) -> tu
     return key.road, key.lane, 1 if bool(lanes.lanes.forward[own]) else -1
 
 
+def lane_on_the_way(
+    conditions: ConditionReader, actor: str, lane: int
+) -> tuple[str, int, int] | None:
+    """Road and lane id on the way straight on from where an actor starts, and the side as above.
+
+    Of the first road on which a lane of that id leads the same way; ``None`` if none has one, or
+    the one on which it starts.
+    """
+    positions, lanes = conditions.positions, conditions.positions.graph.lanes
+    start = start_of(conditions, actor)
+    if start is None:
+        return None
+    ways = {
+        (key.road, key.lane): bool(lanes.lanes.forward[row])
+        for row, key in enumerate(lanes.lanes.keys)
+    }
+    begin = positions.node_near(start)
+    for node in positions.nodes_on(begin, _AHEAD):
+        row = int(lanes.lane[node])
+        key, forward = lanes.lanes.keys[row], bool(lanes.lanes.forward[row])
+        if ways.get((key.road, lane)) == forward:
+            if key.road == lanes.lanes.keys[int(lanes.lane[begin])].road:
+                return None
+            return key.road, key.lane, 1 if forward else -1
+    return None
+
+
 def to_opposite(
     conditions: ConditionReader, actor: str, road: str, own: int, aim: int
 ) -> float | None:
@@ -89,6 +116,8 @@ def to_opposite(
 
 
 # -------------------------------------------------------------- private actions as actions of rules
+_AHEAD: Final = 2000.0
+"""Metres straight on for which a lane of an id is looked for."""
 Made = dict[str, Any]
 _SHAPES: Final = {"linear": "linear", "sinusoidal": "cosine", "cubic": "cubic"}
 _MEASURES: Final = {"time": "over", "rate": "rate", "distance": "within"}
@@ -294,10 +323,16 @@ def _read_lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         aim += 0 if aim * own > 0 else side * by  # there is no lane 0
     else:
         road, own, side = start_lane(read.conditions, lane, entity.id)
+        ahead = None
+        if entity.id not in read.lanes and not read.own:
+            ahead = lane_on_the_way(read.conditions, entity.id, value)
+        road, own, side = ahead or (road, own, side)
         own, aim = read.lanes.get(entity.id, own), value
         read.lanes[entity.id] = value
         by = side * (value - own - ((value > 0) - (own > 0)))  # there is no lane 0
         words = f"{by:+d} lanes from the last one that the file names for it"
+        if ahead is not None:
+            words = f"{by:+d} lanes, as on road {road!r}: that on which it starts has no such lane"
     if by == 0:
         report.mark(lane, "approximated", "by none, in the lane in which it is")
         return _within_lane(read, kind, entity, how)
@@ -463,6 +498,9 @@ def _read_gap(read: ActionReader, kind: _Element, _entity: ReadEntity) -> Made:
         for attribute in ("maxAccelerationRate", "maxDecelerationRate"):
             if limits.get(attribute) is not None:
                 report.mark(limits, "approximated", words)
+        if not read.own:
+            words = "how it comes to the gap within its limits is not in the standard"
+            report.mark(kind, "approximated", words)
     if kind.get("continuous") == "false":
         part["once"] = True
         if limits is None:

@@ -26,6 +26,7 @@ ALWAYS: Final[Made] = {"time": {"after": 0.0}}
 NEVER: Final[Made] = {"not": ALWAYS}
 _TRUTH: Final = {"true": "1", "false": "0"}
 _SAME_AXLE: Final = 0.01
+_OF_ROADS: Final = ("road", "lane", "trajectory")
 _ROAD_END: Final = 10.0
 _FAR: Final = 100_000.0
 """Metres."""
@@ -318,6 +319,9 @@ def _read_headway(read: ConditionReader, kind: _Element, of: str) -> Made:
 
 def _read_pair(read: ConditionReader, kind: _Element, of: str, to: str) -> Made:
     """Who is meant, and whether seconds are between bodies or, as here, their reference points."""
+    if kind.get("alongRoute") == "true" or kind.get("coordinateSystem") in _OF_ROADS:
+        words = "along the heading of the one behind, not along its road"
+        read.report.mark(kind, "approximated", words)
     if kind.get("freespace") == "true":
         return {"of": of, "to": to}
     return {"of": of, "to": to, "free": False, **_reference_points(read, of, to)}
