@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import polars as pl
 import pytest
 
 from odscen.app.exchange.imports import ImportedFile, import_file
+from odscen.app.running.runs import run
 from odscen.lanegraph.query import node_index
 from odscen.maps.shipped import shipped_maps
 from odscen.maps.store import Workspace
+from odscen.runs.run_settings import RunSettings
 from tests.sumo.story_case import loaded
 
 if TYPE_CHECKING:
@@ -104,3 +107,16 @@ def test_a_lane_that_the_road_of_the_start_lacks_is_that_of_the_next_one_that_ha
     (rule,) = (one for one in found.scenario.rules if one.id == "merge")
     (action,) = rule.then
     assert (action.lane.by if action.lane else None) == by
+
+
+def test_who_stands_at_the_end_of_a_road_can_start_there(tmp_path: Path) -> None:
+    (tmp_path / "ramp.xodr").write_text(RAMP, encoding="utf-8")
+    text = FILE.format(route="").replace("signal_crossing", "ramp")
+    text = text.replace('x="-60" y="-1.75"', 'x="499.5" y="-1.75"')
+    (tmp_path / "end.xosc").write_text(text, encoding="utf-8")
+    workspace = Workspace.open(tmp_path / "workspace")
+    found = import_file(workspace, tmp_path / "end.xosc")
+    assert [one for one in found.problems if one.severity == "error"] == []
+    done = run(workspace, found.scenario, settings=RunSettings(until=2), name="r", out=tmp_path)
+    last = done.trajectories().filter(pl.col("time") > 1.5)
+    assert last["x"].to_numpy() == pytest.approx(499.5, abs=0.01)

@@ -1766,7 +1766,7 @@ export const SERVER_SENTENCES: readonly MessageDescriptor[] = [
   msg({ message: "this server does not answer to the name {name}" }),
   msg({ message: "this server needs the token that it printed when it was started: open that link again, or send it as Authorization: Bearer TOKEN" }),
   msg({ message: "those of today" }),
-  msg({ message: "through its places in their order, by the shortest ways, if those lead there" }),
+  msg({ message: "through its places in their order, by the shortest paths, if those lead there" }),
   msg({ message: "through: without driveways and aisles of car parks" }),
   msg({ message: "tile {column}/{row}" }),
   msg({ message: "tile {name} has more than {most_tile} MB" }),

@@ -274,13 +274,17 @@ class ActorPlaces:
         return then
 
     def is_near_lane(self, centre: MapPoint) -> bool:
-        """Whether a vehicle can start on the nearest lane and be beside it."""
-        return abs(float(self._positions.beside_lane(centre))) <= _BESIDE
+        """Whether a vehicle can start on the nearest lane, which leads on, and be beside it."""
+        near = abs(float(self._positions.beside_lane(centre))) <= _BESIDE
+        return near and self._leads_on(self._positions.node_near(centre))
+
+    def _leads_on(self, node: int) -> bool:
+        return self._positions.along(node, _FAR) != node
 
     def vehicle(self, entity: ReadEntity, centre: MapPoint, *, led: bool = False) -> dict[str, Any]:
         """Node nearest to the centre of the body, and the offsets from it."""
         graph, lanes = self._positions.graph, self._positions.graph.lanes
-        node = self._positions.node_near(centre)
+        node = self._node_with_way(centre)
         dx, dy = centre.x - float(lanes.x[node]), centre.y - float(lanes.y[node])
         hdg = float(lanes.hdg[node])
         along = dx * math.cos(hdg) + dy * math.sin(hdg)
@@ -302,6 +306,14 @@ class ActorPlaces:
             "lateral_offset": round(left, 3),
             **({"longitudinal_offset": ahead} if ahead else {}),
         }
+
+    def _node_with_way(self, centre: MapPoint) -> int:
+        """Lane node nearest to a point, or at the end of a lane the one before: a way leads on."""
+        positions, length = self._positions, self._positions.graph.lanes.length
+        node = positions.node_near(centre)
+        if self._leads_on(node):
+            return node
+        return positions.along(node, -float(length.max(initial=1.0)))
 
     def _way_straight_on(self, node: int) -> Made:
         """Goal of who has none, straight on; through the lanes there if no shorter way does."""

@@ -552,7 +552,7 @@ def _read_goal(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
         raise RefusedError(kind, "a route without places")
     first = any(True for _ in kind.iterancestors("Init"))
     words = (
-        "through its places in their order, by the shortest ways, if those lead there"
+        "through its places in their order, by the shortest paths, if those lead there"
         if first
         else "only the last place of a route is a goal"
     )
