@@ -259,11 +259,30 @@ def is_connected(segments: Segments, ids: Iterable[str]) -> bool:
 
 def largest_part(segments: Segments) -> tuple[SegmentId, ...]:
     """Segments of the largest connected part of a map, in the order of the map."""
-    import networkx as nx
-
-    parts = nx.connected_components(_induced_adjacency(segments, segments.ids))
+    parts = _connected_parts(segments)
     largest: set[int] = max(parts, key=lambda part: (len(part), -min(part)), default=set())
     return tuple(segments.ids[row] for row in sorted(largest))
+
+
+def parts_with(segments: Segments, ids: Iterable[str]) -> tuple[SegmentId, ...]:
+    """Segments of the connected parts of a map that have any of ``ids``; largest part without.
+
+    Raises
+    ------
+    NotFoundError
+        If the map has no such segment.
+    """
+    wanted = set(segment_rows(segments, ids).tolist())
+    found = [part for part in _connected_parts(segments) if part & wanted]
+    if not found:
+        return largest_part(segments)
+    return tuple(segments.ids[row] for row in sorted(set().union(*found)))
+
+
+def _connected_parts(segments: Segments) -> list[set[int]]:
+    import networkx as nx
+
+    return list(nx.connected_components(_induced_adjacency(segments, segments.ids)))
 
 
 def removable(segments: Segments, ids: Iterable[str]) -> tuple[SegmentId, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
@@ -31,7 +32,7 @@ from odscen.formats.openscenario_import.story.read_storyboard import StoryReader
 from odscen.formats.openscenario_import.story.value_changes import first_values
 from odscen.formats.openscenario_import.world.read_entities import read_entities
 from odscen.formats.openscenario_import.world.read_environment import read_environment
-from odscen.lanegraph.query import largest_part
+from odscen.lanegraph.query import parts_with, segment_of_node
 from odscen.opendrive.lanes import RoadTable
 from odscen.scenario.document.problems import validated
 from odscen.scenario.document.scenario_document import Scenario
@@ -133,7 +134,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
         "description": "" if story.own and _read_title(root) == name else _read_title(root),
         "map": {"name": source.map_name, "sha256": source.sha256,
                 "spacing": source.graph.lanes.spacing},
-        "roi": list(largest_part(source.graph.segments)),
+        "roi": _find_region(source.graph, actors),
         "drivers": {"sets": [STEADY_DRIVER] if _any_steady(actors) else []},
         "actors": actors,
         "simulation": simulation,
@@ -212,6 +213,18 @@ def _on_wheels(report: ImportReport, entities: Iterable[ReadEntity]) -> None:
             entity.category, entity.sized = Category.MOTORCYCLE, True
             words = "a motorcycle of its size: the map has nothing to walk on"
             report.mark(entity.element, "approximated", words)
+
+
+def _find_region(graph: MapGraph, actors: list[dict[str, Any]]) -> list[str]:
+    """Segments of those parts of the map, which may have no way between them, in which some start.
+
+    A file that odscen wrote may name nodes of another map.
+    """
+    found = set()
+    for actor in actors:
+        with suppress(NotFoundError):
+            found.add(segment_of_node(graph, str(actor["spawn"])))
+    return [str(name) for name in parts_with(graph.segments, found)]
 
 
 def _any_steady(actors: list[dict[str, Any]]) -> bool:

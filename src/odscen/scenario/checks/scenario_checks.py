@@ -8,6 +8,7 @@ from math import floor
 from typing import TYPE_CHECKING, NamedTuple
 
 from odscen.base.shown import some_of
+from odscen.lanegraph.query import neighbours
 from odscen.scenario.checks.actor_checks import (
     AssetLookup,
     actor_problems,
@@ -250,7 +251,10 @@ def every_problem(
 
 
 def roi_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
-    """Yield what is wrong with the region of interest (R29)."""
+    """Yield what is wrong with the region of interest (R29).
+
+    It is in one piece, or in several between which the map has nothing.
+    """
     if not scenario.roi:
         yield error("roi_empty", "roi", "the region of interest is empty; pick a segment")
         return
@@ -264,7 +268,7 @@ def roi_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
             message = f"segment {name!r} is listed {count} times; once is enough"
             yield warning("segment_twice", "roi", message, segments=[name])
     region = Region.of(graph, scenario.roi)
-    if not region.is_whole:
+    if not region.is_whole and neighbours(graph.segments, region.segments):
         yield error(
             "roi_not_connected",
             "roi",
@@ -277,12 +281,15 @@ def roi_problems(scenario: Scenario, graph: MapGraph) -> Iterator[Problem]:
 def shared_nodes(scenario: Scenario) -> Iterator[Problem]:
     """Yield nodes that more than one actor or flow starts on (R37, R44).
 
-    Flows may follow one another on a node, as where an inflow grows by steps.
+    Flows may follow one another on a node, as where an inflow grows by steps; and whom the story
+    drives starts wherever it is put, beside or in another body, see :func:`start_overlaps`.
     """
     users: dict[str, list[tuple[str, Actor | Flow]]] = defaultdict(list)
-    for kind in ("actors", "flows"):
-        for index, one in enumerate(getattr(scenario, kind)):
-            users[one.spawn].append((f"{kind}[{index}].spawn", one))
+    for index, actor in enumerate(scenario.actors):
+        if actor.driver != "story":
+            users[actor.spawn].append((f"actors[{index}].spawn", actor))
+    for index, flow in enumerate(scenario.flows):
+        users[flow.spawn].append((f"flows[{index}].spawn", flow))
     for node, sharing in users.items():
         if len(sharing) > 1 and not _follow_each_other([one for _, one in sharing]):
             names = some_of([repr(one.id) for _, one in sharing])

@@ -174,6 +174,8 @@ class Stepper:
                 only=self._take_gaps, moved=moved, placed=self._placed_by_others()
             )
         after = session.step()
+        if self.story is not None:
+            self.story.say_speeds()
         if self.behaviour is None:
             session.turning_gaps.after_step()
         recorder.record(session, now)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from odscen.sumo.worker.simulation.lane_lines import LaneLines
@@ -326,6 +327,11 @@ class MovedActors:
     def begin_at(self, vehicle: str, speed: float) -> None:
         """Let a vehicle that has just departed have another speed."""
         self._sumo.vehicle.setPreviousSpeed(vehicle, speed)
+
+    def say_speed(self, vehicle: str, speed: float) -> None:
+        """Let another speed be that of the step that has been made, if a vehicle is still there."""
+        with suppress(*self._errors):
+            self._sumo.vehicle.setPreviousSpeed(vehicle, speed)
 
     def show_lights(self, vehicle: str, lights: Sequence[str] | None) -> None:
         """Set the lights of a vehicle, or give them back to the driver."""

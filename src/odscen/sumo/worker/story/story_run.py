@@ -16,6 +16,7 @@ from odscen.sumo.realize.rules.story_files import StoryPlan
 from odscen.sumo.worker.simulation.moved_actors import SavedWalk
 from odscen.sumo.worker.story.body_contacts import BodyContacts
 from odscen.sumo.worker.story.end_watch import EndWatch
+from odscen.sumo.worker.story.ground_pace import GroundPaces
 from odscen.sumo.worker.story.saved_walks import mend_walks
 from odscen.sumo.worker.story.story_hands import StoryHands
 from odscen.sumo.worker.story.story_view import StoryView
@@ -49,12 +50,16 @@ class StoryRun:
         self._plan = story
         self._planned = {actor.id: actor for actor in plan.actors}
         self._actors = {actor.id: actor for actor in plan.actors if actor.id in names}
+        self._paces = GroundPaces(plan.step_length)
+        self._said: dict[str, float] = {}
+        self._begins = False
         self._engine = StoryEngine(story.rules, step=plan.step_length, by_story=story.by_story)
         self._view = StoryView(
             story,
             self._actors,
             net_offset=plan.net_offset,
             rule_changes=self._engine.rule_changes,
+            extra=self._paces.extra,
         )
         self._read_wishes(story)
         self._end = EndWatch(plan, self._view)
@@ -117,8 +122,15 @@ class StoryRun:
         """Begin with a simulation; after a saved state, do again what the state does not hold."""
         self._road = session.moved_actors()
         self._hands.begin(self._road)
+        self._begins = True
         for name, move in self._moves.items():
             self._act_on_actor(self._road, name, move, None)
+        self._begins = False
+
+    def say_speeds(self) -> None:
+        """Let SUMO say of whom the story drives the speeds on the ground, after each step."""
+        for name, speed in self._said.items():
+            self._road.say_speed(name, speed)
 
     @property
     def waits(self) -> bool:
@@ -171,6 +183,7 @@ class StoryRun:
         time: float,
     ) -> None:
         """Do what rules want until the next look."""
+        self._said = {}
         if not moved and not wanted and not self._engine.asked:
             return
         self._lost = self._hands.lost = []
@@ -216,6 +229,7 @@ class StoryRun:
             "waits": {name: list(pose) for name, pose in self._waits.items()},
             "walks": {name: [list(one.edges), one.arrival] for name, one in self._walks.items()},
             "end": self._end.state(),
+            "paces": self._paces.state(),
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -226,6 +240,7 @@ class StoryRun:
         self._hands.restore(state["hands"])
         if "end" in state:
             self._end.restore(state["end"])
+        self._paces.restore(state.get("paces", {}))
         self._goal_edges = dict(state["goal_edges"])
         self._sent = dict(state["sent"])
         for name, kept in state["moves"].items():
@@ -254,13 +269,14 @@ class StoryRun:
     def _move_vehicle(
         self, road: MovedActors, name: str, move: WantedMove, before: WantedMove
     ) -> None:
+        speed = self._speed_for_sumo(name, move)
         ignored = move.ignore_red, move.ignore_right_of_way
         changed = ignored != (before.ignore_red, before.ignore_right_of_way)
         if changed or move.speed is not None or before.speed is not None:
-            self._allow_speed(road, name, move.speed)
+            self._allow_speed(road, name, speed)
             road.drive(
                 name,
-                move.speed,
+                speed,
                 exact=move.exact,
                 ignore_red=move.ignore_red,
                 ignore_right_of_way=move.ignore_right_of_way,
@@ -275,6 +291,23 @@ class StoryRun:
         if (pose := move.pose) is not None:
             x, y = pose.x + self._offset[0], pose.y + self._offset[1]
             road.put_vehicle(name, x, y, float(angle_deg_from_hdg(pose.hdg)))
+
+    def _speed_for_sumo(self, name: str, move: WantedMove) -> float | None:
+        """Speed that makes that of a move on the ground; other than along a lane they are one."""
+        if not (move.follows_lane and move.exact) or move.speed is None:
+            self._paces.rest(name)
+            return move.speed
+        speed: float | None
+        if self._begins:
+            speed = self._paces.given(name)
+        else:
+            actor = self._view.actor(name)
+            speed = move.speed if actor is None else self._paces.speed(actor, move.speed)
+        if speed is None:
+            return move.speed
+        if speed != move.speed:
+            self._said[name] = move.speed
+        return speed
 
     def _keep_goal(self, road: MovedActors, name: str, move: WantedMove) -> None:
         """Keep the goal of a vehicle that is put somewhere: SUMO forgets its route beside it."""

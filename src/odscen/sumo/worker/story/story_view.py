@@ -41,6 +41,11 @@ class StoryView:
     rule_changes
         Of the engine.
 
+    Parameters
+    ----------
+    extra
+        Metres that SUMO has counted more than a vehicle has covered.
+
     Attributes
     ----------
     whole
@@ -57,10 +62,12 @@ class StoryView:
         *,
         net_offset: tuple[float, float],
         rule_changes: Callable[[str, str], tuple[float, ...]],
+        extra: Callable[[str], float],
     ) -> None:
         self._plan = plan
         self._actors = actors
         self._offset = net_offset
+        self._extra = extra
         self.rule_changes = rule_changes
         self.whole: set[str] = set()
         self.always: set[str] = set()
@@ -162,6 +169,10 @@ class StoryView:
                 where, ahead = self._road.road_place(other.id), ahead - other.length / 2.0
         else:
             where = self._lane_position_of(to)
+        if other is None and where[0].startswith(":"):
+            abreast = self._metres_abreast(own, self.place(to))
+            if abreast is not None:
+                return abreast
         metres = self._road.driving_distance(actor, *where)
         if metres is None and other is None:
             under = _metres_under_body(own, self.place(to))
@@ -257,7 +268,7 @@ class StoryView:
         if seen is None:
             return None
         x, y, angle, speed, faster, odometer, lane, left = seen
-        travelled = self._leave_out_jumps(planned.id, odometer)
+        travelled = self._leave_out_jumps(planned.id, odometer) - self._extra(planned.id)
         off_road = not lane or abs(left) > self._half_width(lane)
         return self._make_view(planned, x, y, angle, speed, faster, travelled, off_road=off_road)
 
