@@ -552,7 +552,9 @@ class InitReader:
         steps = itertools.takewhile(lambda change: change.get("shape") == "step", changes)
         at_once = [change["to"] for change in steps]
         profile = len(each) > len(then)
-        first = at_once[-1] if at_once and (profile or len(at_once) == len(changes)) else 0.0
+        first = speed if len(at_once) == len(changes) else 0.0
+        if profile and at_once:
+            first = at_once[-1]
         led = [action["path"] for action in then if "path" in action]
         if self._story.actions is not None and entity.id in self._story.actions.reversing:
             for path in led:
