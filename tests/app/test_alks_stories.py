@@ -102,11 +102,21 @@ def test_the_lead_vehicle_swerves_in_its_lane_to_both_sides_and_comes_back(folde
 
 
 def test_the_side_vehicle_stays_abreast_in_the_next_lane(folder: Path) -> None:
-    motions = story(folder, "4_1_3_side_vehicle", until=15)
+    motions = story(folder, "4_1_3_side_vehicle", until=45)
     side, ego = motions["SideVehicle"], motions["Ego"]
-    assert np.abs(side.x - ego.x).max() < 7
-    assert (side.y - ego.y).min() > WIDTH / 2
-    assert (side.y - ego.y).max() < 1.5 * WIDTH
+    straight = side.time < 15
+    assert np.abs(side.x - ego.x)[straight].max() < 7
+    assert (side.y - ego.y)[straight].min() > WIDTH / 2
+    assert (side.y - ego.y)[straight].max() < 1.5 * WIDTH
+
+
+def test_the_side_vehicle_drives_a_bend_at_its_speed_on_the_ground(folder: Path) -> None:
+    side = story(folder, "4_1_3_side_vehicle", until=45)["SideVehicle"]
+    assert np.ptp(side.y) > 30.0
+    covered = np.hypot(np.diff(side.x), np.diff(side.y)).cumsum()
+    assert np.abs(covered - SPEED * (side.time[1:] - side.time[0])).max() < 0.3
+    assert side.speed == pytest.approx(np.full(len(side.speed), SPEED), abs=0.15)
+    assert side.speed.mean() == pytest.approx(SPEED, abs=0.01)
 
 
 @pytest.mark.parametrize(

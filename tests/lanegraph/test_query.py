@@ -17,6 +17,7 @@ from odscen.lanegraph.query import (
     node_id,
     node_ids,
     node_index,
+    parts_with,
     removable,
     walk_node_id,
     walk_node_ids,
@@ -138,3 +139,12 @@ def test_the_largest_part_is_the_one_with_most_segments_and_of_equals_the_first(
     beside = [pair for pair in line.adjacency.tolist() if 4 not in pair and 7 not in pair]
     parted = replace(line, adjacency=np.array(beside, dtype=line.adjacency.dtype))
     assert largest_part(parted) == line.ids[:4]
+
+
+def test_parts_of_a_map_are_those_that_have_segments() -> None:
+    line = LINE.segments
+    beside = [pair for pair in line.adjacency.tolist() if 3 not in pair]
+    parted = replace(line, adjacency=np.array(beside, dtype=line.adjacency.dtype))
+    assert parts_with(parted, line.ids[1:2]) == line.ids[:3]
+    assert parts_with(parted, [line.ids[5], line.ids[0]]) == line.ids[:3] + line.ids[4:]
+    assert parts_with(parted, []) == line.ids[4:]

@@ -1,6 +1,8 @@
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
 import pytest
 
 from odscen.base.arrays import BoolArray
@@ -148,6 +150,10 @@ def test_a_node_carries_one_actor_or_one_flow() -> None:
     flow = Flow(id="f", spawn="1.0.-1.10", per_hour=100)
     assert codes(actor(), actor(id="b", depart=9)) == ["node_taken"]
     assert codes(actor(), flows=(flow,)) == ["node_taken"]
+    led = actor(id="b", driver="story", longitudinal_offset=6.0)
+    assert codes(actor(), led) == []
+    on_it = led.model_copy(update={"longitudinal_offset": 0.0})
+    assert codes(actor(driver="story"), on_it) == codes(actor(), on_it) == ["bodies_overlap"]
 
 
 def test_flows_follow_one_another_on_a_node() -> None:
@@ -173,6 +179,12 @@ def test_the_region_is_checked() -> None:
     line = line_of_segments()
     assert codes(graph=line, roi=()) == ["roi_empty", "no_actors"]
     assert codes(graph=line, roi=("r1", "r3")) == ["roi_not_connected", "no_actors"]
+    beside = [pair for pair in line.segments.adjacency.tolist() if 3 not in pair]
+    pairs = np.array(beside, dtype=line.segments.adjacency.dtype)
+    parted = replace(line, segments=replace(line.segments, adjacency=pairs))
+    ids = parted.segments.ids
+    assert codes(graph=parted, roi=ids[:3] + ids[4:]) == ["no_actors"]
+    assert codes(graph=parted, roi=ids[:2] + ids[4:]) == ["roi_not_connected", "no_actors"]
     assert codes(graph=line, roi=("r1", "r9", "r1")) == [
         "unknown_segment",
         "segment_twice",
