@@ -75,6 +75,11 @@ class ActorCalls:
         x, y, z, *turn = wire.pose(at)
         if found.kind is Kind.VEHICLE:
             x, z = x + self._switches.place_aside, z + self._switches.place_error
+            if self._switches.drops_pitch:
+                turn[0] = 0.0
+            if self._switches.late_places:
+                self._world.late_places[actor] = (x, y, z, *turn)
+                return
         found.put((x, y, z, *turn))
 
     @rpc("set_actor_location", Returns.VOID)

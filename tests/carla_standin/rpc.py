@@ -78,7 +78,8 @@ class MethodTable:
             await self._do(*call)
 
     async def _do(self, name: str, params: list[Any]) -> tuple[Any, Any]:
-        if name not in self._methods:
+        unknown = name == "project_point" and self._switches.no_projection
+        if name not in self._methods or unknown:
             return f"there is no function {name}", None
         method, returns = self._methods[name]
         try:

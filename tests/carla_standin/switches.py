@@ -41,6 +41,10 @@ class Switches:
         Metres above the ground from which on a body is made.
     place_error, place_aside
         Metres by which a vehicle that is put somewhere is too high, and too far along x.
+    drops_pitch
+        Whether vehicles that are put somewhere stay level.
+    late_places
+        Whether vehicles are where they were put a tick later only.
     half_capsule
         Whether a walker's half height is added to where it is put, as a real server does.
     walkers_drift
@@ -51,6 +55,8 @@ class Switches:
         By how many times actors with physics report their velocity.
     blind_ground
         Whether nothing is ever found below a place.
+    no_projection
+        Whether it does not know the call that says what is below a place.
     late_calls
         When calls that wait for no answer are done, as a real server's worker threads may do them:
         at once if empty, ``call`` behind the next call that waits, ``tick`` behind the next tick.
@@ -86,11 +92,14 @@ class Switches:
     least_lift: float = 0.15
     place_error: float = 0.0
     place_aside: float = 0.0
+    drops_pitch: bool = False
+    late_places: bool = False
     half_capsule: bool = True
     walkers_drift: bool = False
     still_speed: float = 0.0
     speed_factor: float = 1.0
     blind_ground: bool = False
+    no_projection: bool = False
     late_calls: str = ""
     nameless_lights: int = 0
     deaf_lamps: bool = False

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -221,6 +222,28 @@ def test_those_whom_the_server_never_takes_are_named(start: Start) -> None:
         assert len(told["carla"]["refused"]) > 20
         assert "not taken by CARLA" in words
         assert "collision" in words
+        assert is_as_before(server)
+
+
+@pytest.mark.slow
+def test_a_run_too_short_to_be_given_up_is_no_success_where_nobody_was_shown(start: Start) -> None:
+    with StandIn(CROSSING, refuse_spawn_every=1) as server:
+        code, told, _ = start(server, until=1.0).wait()
+        assert (code, told["carla"]["spawned"]) == (3, 0)
+        assert re.search(r"takes no road user|has taken none of \d+ road users", str(told))
+        assert is_as_before(server)
+
+
+@pytest.mark.slow
+def test_a_server_that_does_not_say_where_the_ground_is_shows_the_run_with_a_word(
+    start: Start,
+) -> None:
+    with StandIn(CROSSING, no_projection=True) as server:
+        code, told, words = start(server, until=5.0).wait()
+        assert (code, told["status"]) == (0, "completed")
+        assert told["carla"]["spawned"] > 20
+        assert sum("does not say where the ground is" in w for w in told["carla"]["warnings"]) == 1
+        assert "does not say where the ground is" in words
         assert is_as_before(server)
 
 

@@ -64,6 +64,32 @@ def mirrored(
 
 
 @pytest.mark.slow
+def test_who_is_far_below_the_roads_is_not_in_the_traffic(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    path = scenario_of(workspace, WEAVE, FOLLOWERS, tmp_path)
+    with StandIn(WEAVE, map_name=WEAVE.stem, refuse_grounded=False) as server:
+        places = [hero_pose(workspace, WEAVE, f"{lane}.30") for lane in ROADS.values()]
+        cars = [Car((x, y, -500.0, yaw), [(0.0, 0.0)]) for x, y, _, yaw in places]
+        with Driver(server, *cars):
+            result, report = cosim(
+                workspace,
+                path,
+                CosimOptions(
+                    Address(server.host, server.port), tick=STEP, foreign=ForeignRoles(),
+                    parity=False,
+                ),
+                out=tmp_path / "runs",
+                settings=RunSettings(until=8.0, step_length=STEP),
+            )  # fmt: skip
+    assert (result.status, report.error) == ("completed", None)
+    rows = pl.read_parquet(result.folder / "trajectories.parquet")
+    assert set(rows["vehicle_id"]) == set(ROADS)
+    late = rows.filter(pl.col("timestep_time") > 2.0)
+    assert late["vehicle_speed"].min() > 11.0  # they would stop 56 m ahead, at 6 s
+
+
+@pytest.mark.slow
 def test_traffic_brakes_for_two_vehicles_that_another_client_drives_and_resumes_when_one_goes(
     workspace: Workspace, tmp_path: Path
 ) -> None:

@@ -300,6 +300,8 @@ class CarlaMirror(Simulator[MirroredRun]):
             if outcome.sim_seconds is not None:
                 witnesses.write(folder)
             show.conclude()
+        if report.refused and not report.spawned and report.error is None:
+            report.error = f"the server has taken none of {len(report.refused)} road users"
         report.left_behind = server.left_behind
         witnesses.conclude(report)
         return outcome

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from odscen.simulators.assets import Assets
 
 _BODIES = ("vehicle.", "walker.")
+_LEVEL = 20.0
+"""Metres below the lowest and above the highest lane beyond which nobody is in the traffic."""
 _STILL = 0.01
 """m/s below which an actor reports no speed: without physics all do, and displacement tells it."""
 
@@ -54,6 +56,8 @@ class ForeignActors:
         Of SUMO's network.
     assets
         Say what a model is, where the server does not.
+    heights
+        Lowest and highest lane of the map, m: servers keep who is to be away far below.
     left_out
         Actor that is seen already, as SUMO's ego.
 
@@ -70,8 +74,10 @@ class ForeignActors:
         assets: Assets,
         roles: ForeignRoles,
         *,
+        heights: tuple[float, float],
         left_out: int | None = None,
     ) -> None:
+        self._lowest, self._highest = heights[0] - _LEVEL, heights[1] + _LEVEL
         self.seen: dict[int, tuple[str, str]] = {}
         self._server = server
         self._offset = net_offset
@@ -102,7 +108,8 @@ class ForeignActors:
         users, places = [], {}
         for actor in sorted(there, key=lambda actor: actor.id):
             known = self._known[actor.id]
-            if known is not None:
+            height = actor.get_transform().location.z
+            if known is not None and self._lowest <= height <= self._highest:
                 user, place = self._describe_user(actor, known, passed)
                 users.append(user)
                 places[actor.id] = place

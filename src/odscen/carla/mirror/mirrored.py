@@ -563,8 +563,14 @@ class MirroredPlan:
         foreign = None
         if options.foreign is not None:
             hero = ego.hero if ego else None
+            z = on.graph.lanes.z
             foreign = ForeignActors(
-                server, plan.net_offset, on.assets, options.foreign, left_out=hero
+                server,
+                plan.net_offset,
+                on.assets,
+                options.foreign,
+                heights=(float(z.min()), float(z.max())),
+                left_out=hero,
             )
         wheels = doors = None
         if not options.sensed_speed and options.wheel_calls:

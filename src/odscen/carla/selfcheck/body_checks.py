@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 GROUND = "ground below places"
 CAR_LIFT, WALKER_LIFT = "height at which a car is made", "height at which a walker is made"
 CAR_PLACE, CAR_HEIGHT = "place of a car", "height of a car"
+CAR_PITCH = "pitch of a car"
 STILL_SPEED, LAMPS = "speed reported without physics", "lights of a car"
 SENSED_PLACE, SENSED_SPEED = "place with --sensed-speed", "speed with --sensed-speed"
 FEET, DRIFT = "feet of a walker", "walk of a walker"
@@ -38,6 +39,7 @@ BODY_NAMES = (
     WALKER_LIFT,
     CAR_PLACE,
     CAR_HEIGHT,
+    CAR_PITCH,
     STILL_SPEED,
     LAMPS,
     SENSED_PLACE,
@@ -48,6 +50,8 @@ BODY_NAMES = (
 """In the order in which they are checked."""
 TRIED = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.6, 1.2)
 """Metres above the ground at which bodies are tried."""
+TILT = 4.0
+"""Degrees by which the car is tilted: a slope of 7 %."""
 SPEED, WALK = 10.0, 1.4
 """m/s of the car and of the walker."""
 _NAME = ROLE + "selfcheck"
@@ -165,6 +169,7 @@ class BodyChecks:
             (handle,) = self.server.actors([actor])
             lamps = int(handle.get_light_state())
         seen, speed = self.server.place(actor), self._speed_of(actor)
+        pitch = self._tilt(actor, wanted)
         self._remove_body(actor)
         turn = abs((seen.yaw - wanted.yaw + 180.0) % 360.0 - 180.0)
         off = math.hypot(seen.x - wanted.x, seen.y - wanted.y)
@@ -182,6 +187,12 @@ class BodyChecks:
                 f"within {limits.place:g} m of where it is put",
                 f"{up:+.4f} m",
                 ok=abs(up) <= limits.place,
+            ),
+            judged(
+                CAR_PITCH,
+                f"within {limits.heading:g} degrees of {TILT:g} degrees, to which it is tilted",
+                f"{pitch:.3f} degrees",
+                ok=abs(pitch - TILT) <= limits.heading,
             ),
             judged(
                 STILL_SPEED,
@@ -302,6 +313,14 @@ class BodyChecks:
             at = _place_ahead(at, SPEED * self.delta)
             self.server.apply(Batch(move=(Move(actor, at, ahead, SPEED, False),)))
         return at
+
+    def _tilt(self, actor: int, at: ActorPlace) -> float:
+        """Tilt a car where it stands, for two ticks; its pitch then, degrees."""
+        for _ in range(2):
+            self.server.apply(
+                Batch(move=(Move(actor, at._replace(pitch=TILT), _STILL, 0.0, False),))
+            )
+        return self.server.place(actor).pitch
 
     def _remove_body(self, actor: int) -> None:
         self.server.destroy([actor])

@@ -33,6 +33,9 @@ _KIND = (
 class Server(BorrowedServer):
     """A CARLA server that this program has borrowed, and what it can be asked for."""
 
+    _projects = True
+    """Whether it knows the call that says what is below a place."""
+
     # ------------------------------------------------------------------------------- the map
     @property
     def map_name(self) -> str:
@@ -185,10 +188,23 @@ class Server(BorrowedServer):
     def ground_below(self, x: float, y: float, z: float, reach: float) -> float | None:
         """Height of the ground at most ``reach`` metres straight below a place.
 
-        ``None`` if there is none, or if a body is in between. Metres, CARLA's frame.
+        ``None`` if there is none, if a body is in between, or if the server does not know the
+        call, of which it then warns once. Metres, CARLA's frame.
         """
+        if not self._projects:
+            return None
         with self._expect_answer():
-            found = self._world.ground_projection(self._carla.Location(x, y, z), reach)
+            try:
+                found = self._world.ground_projection(self._carla.Location(x, y, z), reach)
+            except RuntimeError as error:
+                if "time-out" in str(error):
+                    raise
+                self._projects = False
+                self.warnings.append(
+                    f"the server does not say where the ground is ({error}); pedestrians and "
+                    "vehicles are put on the surface of the map's file"
+                )
+                return None
         if found is None or not self.release.is_ground(found.label):
             return None
         return float(found.location.z)
