@@ -382,6 +382,10 @@ class MovedActors:
             return None
         return found if abs(found) < _NOWHERE else None
 
+    def is_in_junction(self, edge: str) -> bool:
+        """Whether an edge leads over a junction."""
+        return not self._lanes.internal.isdisjoint(self._lanes.of_edge[edge])
+
     def road_place(self, vehicle: str) -> tuple[str, float, int]:
         """Edge of a vehicle, metres along it, and its lane."""
         one = self._sumo.vehicle

@@ -169,7 +169,7 @@ class StoryView:
                 where, ahead = self._road.road_place(other.id), ahead - other.length / 2.0
         else:
             where = self._lane_position_of(to)
-        if other is None and where[0].startswith(":"):
+        if other is None and self._road.is_in_junction(where[0]):
             abreast = self._metres_abreast(own, self.place(to))
             if abreast is not None:
                 return abreast
