@@ -38,6 +38,7 @@ WRONG = {
     "height at which a walker is made": "refused at 0, 0.05, 0.1, 0.15, 0.2, 0.3",
     "place of a car": "0.1000 m, ",
     "height of a car": "+0.2000 m",
+    "pitch of a car": "0.000 degrees",
     "speed reported without physics": "3.00 m/s",
     "lights of a car": "0",
     "place with --sensed-speed": "0.2236 m off, of that +0.2000 m up",
@@ -96,7 +97,7 @@ def test_a_server_that_does_as_expected_passes_every_check_and_is_as_it_was(
         assert not world.get_settings().synchronous_mode
         assert server.calls()["load_new_episode"] == loaded
     assert {line.name: line.seen for line in report.lines if line.state != CheckState.OK} == {}
-    assert len(report.lines) == 20
+    assert len(report.lines) == 21
     lines = by_name(report)
     assert lines["map"].seen == "signal_crossing: the same text"
     assert lines["frames of a tick"].seen == "1"
@@ -119,9 +120,9 @@ def test_each_line_says_what_a_server_does_that_does_otherwise(workspace: Worksp
     workspace.add_map(MAPS / "roundabout.xodr")
     with StandIn(
         CROSSING, map_name="roundabout", time_factor=2.0, blind_ground=True, least_lift=0.5,
-        place_error=0.2, place_aside=0.1, still_speed=3.0, deaf_lamps=True, speed_factor=0.5,
-        half_capsule=False, walkers_drift=True, nameless_lights=2, late_calls="tick",
-        tick_seconds=0.06, ground_seconds=0.02, keeps_actors=True,
+        place_error=0.2, place_aside=0.1, drops_pitch=True, still_speed=3.0, deaf_lamps=True,
+        speed_factor=0.5, half_capsule=False, walkers_drift=True, nameless_lights=2,
+        late_calls="tick", tick_seconds=0.06, ground_seconds=0.02, keeps_actors=True,
     ) as server:  # fmt: skip
         report = selfcheck(workspace, address_of(server), limits=CheckLimits(ground_ms=15.0))
     lines = by_name(report)
@@ -164,7 +165,7 @@ def test_another_release_is_the_only_line(workspace: Workspace) -> None:
         assert set(server.calls()) == {"version"}
     assert [line.name for line in report.differing] == ["release"]
     assert "0.9.15" in report.differing[0].seen
-    assert len(report.unchecked) == 19
+    assert len(report.unchecked) == 20
 
 
 @pytest.mark.slow
@@ -183,8 +184,8 @@ def test_the_page_and_the_data_have_every_line(tmp_path: Path, workspace: Worksp
     data = json.loads(Path(printed["files"]["data"]).read_text(encoding="utf-8"))
     assert data == {key: value for key, value in printed.items() if key != "files"}
     assert (data["ok"], data["versions"]["server"]) == (False, "0.9.16-dirty")
-    assert len(data["checks"]) == 20
-    assert "1 of 20 checks differ" in page
+    assert len(data["checks"]) == 21
+    assert "1 of 21 checks differ" in page
     for check in data["checks"]:
         assert f">{check['name']}<" in page
 

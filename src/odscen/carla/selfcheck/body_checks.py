@@ -164,11 +164,11 @@ class BodyChecks:
         """A car without physics, put elsewhere in each tick."""
         actor = self._spawn_body(self._car, self._car_at, walks=False)
         wanted = self._move_forward(actor)
+        seen, speed = self.server.place(actor), self._speed_of(actor)  # before another tick
         self.server.apply(Batch(shine=(SwitchLights(actor, BRAKE | LOW_BEAM),)))
         with answering(self.server.address):
             (handle,) = self.server.actors([actor])
             lamps = int(handle.get_light_state())
-        seen, speed = self.server.place(actor), self._speed_of(actor)
         pitch = self._tilt(actor, wanted)
         self._remove_body(actor)
         turn = abs((seen.yaw - wanted.yaw + 180.0) % 360.0 - 180.0)

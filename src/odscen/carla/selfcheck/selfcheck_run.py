@@ -322,12 +322,12 @@ def _run_all_checks(
         (_NAMES[1:3], lambda: time_lines(server, DELTA)),
         (_NAMES[3:4], bodies.prepare),
         (_NAMES[4:6], bodies.lifts),
-        (_NAMES[6:10], bodies.car),
-        (_NAMES[10:12], bodies.sensed),
-        (_NAMES[12:14], bodies.walker),
-        (_NAMES[14:16], lambda: light_lines(server)),
-        (_NAMES[16:17], lambda: pace_checks.pace_lines(server, limits)),
-        (_NAMES[17:18], lambda: pace_checks.ground_pace_lines(server, limits)),
+        (_NAMES[6:11], bodies.car),
+        (_NAMES[11:13], bodies.sensed),
+        (_NAMES[13:15], bodies.walker),
+        (_NAMES[15:17], lambda: light_lines(server)),
+        (_NAMES[17:18], lambda: pace_checks.pace_lines(server, limits)),
+        (_NAMES[18:19], lambda: pace_checks.ground_pace_lines(server, limits)),
     )
     lines: list[CheckLine] = []
     for k, (names, check) in enumerate(checks):
