@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bz2
 import os
 import statistics
 import tempfile
@@ -18,6 +19,25 @@ def shared_maps() -> Path | None:
     given = os.environ.get("ODSCEN_TEST_MAPS")
     folder = Path(given) if given else Path(__file__).parents[2] / "shared" / "maps"
     return folder if folder.is_dir() else None
+
+
+def osm_extracts() -> list[Path]:
+    """Extracts of OpenStreetMap of ``$ODSCEN_TEST_PLACES``, else of ``../shared/places/osm``.
+
+    Says so if there are none.
+    """
+    given = os.environ.get("ODSCEN_TEST_PLACES")
+    folder = Path(given) if given else Path(__file__).parents[2] / "shared" / "places" / "osm"
+    extracts = sorted(folder.glob("*.osm*"))
+    if not extracts:
+        print(f"skipped: no extracts in {folder} (set ODSCEN_TEST_PLACES)")
+    return extracts
+
+
+def unpacked(extract: Path) -> bytes:
+    """Content of an extract as XML."""
+    content = extract.read_bytes()
+    return bz2.decompress(content) if extract.suffix == ".bz2" else content
 
 
 def compile_modules() -> None:

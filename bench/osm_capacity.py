@@ -12,7 +12,6 @@ Extracts are those of ``$ODSCEN_TEST_PLACES``, else of ``../shared/places/osm``.
 
 from __future__ import annotations
 
-import bz2
 import os
 import statistics
 import subprocess
@@ -25,6 +24,7 @@ import numpy as np
 import sumo
 
 from bench.capacity import FROM_ENDS, NARROWEST, NetworkBench, build_own, run_tool
+from bench.common import osm_extracts, unpacked
 from bench.osm_converters import TYPEMAPS, WIZARD
 from bench.same_limits import add_signs_and_inner_limits
 from odscen.lanegraph.build_graphs import build_map_graph
@@ -43,13 +43,8 @@ LEAST_LANES = 0.5
 
 
 def main() -> None:
-    folder = Path(
-        os.environ.get("ODSCEN_TEST_PLACES")
-        or Path(__file__).parents[2] / "shared" / "places" / "osm"
-    )
-    extracts = sorted(folder.glob("*.osm*"))
+    extracts = osm_extracts()
     if not extracts:
-        print(f"skipped: no extracts in {folder} (set ODSCEN_TEST_PLACES)")
         return
     levels = [int(v) for v in os.environ.get("ODSCEN_BENCH_LEVELS", "100,300,500").split(",")]
     seeds = [int(v) for v in os.environ.get("ODSCEN_BENCH_SEEDS", "1,2").split(",")]
@@ -76,8 +71,7 @@ def main() -> None:
 
 def _bench_of(extract: Path, name: str, folder: Path) -> NetworkBench | None:
     """The networks of an extract; ``None`` if it has hardly a street."""
-    content = extract.read_bytes()
-    content = bz2.decompress(content) if extract.suffix == ".bz2" else content
+    content = unpacked(extract)
     plain, xodr = folder / f"{name}.osm", folder / f"{name}.xodr"
     plain.write_bytes(content)
     opendrive, _ = import_map(

@@ -13,7 +13,6 @@ of each extract beside each other as PNG.
 from __future__ import annotations
 
 import argparse
-import bz2
 import math
 import os
 import subprocess
@@ -31,6 +30,7 @@ import shapely
 import sumo
 from PIL import Image
 
+from bench.common import osm_extracts, unpacked
 from odscen.base.errors import OdscenError
 from odscen.maps.importers.base import ImportSettings
 from odscen.maps.map_pictures import draw_map
@@ -89,13 +89,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pictures", type=Path)
     options = parser.parse_args()
-    folder = Path(
-        os.environ.get("ODSCEN_TEST_PLACES")
-        or Path(__file__).parents[2] / "shared" / "places" / "osm"
-    )
-    extracts = sorted(folder.glob("*.osm*"))
+    extracts = osm_extracts()
     if not extracts:
-        print(f"skipped: no extracts in {folder} (set ODSCEN_TEST_PLACES)")
         return
     tools: dict[str, Callable[[Path, Path], None]] = {
         "odscen": _convert_here,
@@ -114,8 +109,7 @@ def main() -> None:
     print("|", " | ".join(heads), "|")
     print("|---" * len(heads) + "|")
     for extract in extracts:
-        content = extract.read_bytes()
-        content = bz2.decompress(content) if extract.suffix == ".bz2" else content
+        content = unpacked(extract)
         name = extract.name.split(".")[0]
         pictures: list[Image.Image] = []
         print(f"| {name} | (the extract) | {' | '.join(count_extract(content))} | |", flush=True)

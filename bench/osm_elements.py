@@ -9,14 +9,13 @@ became of them is what the import report has of their ids. One that the report d
 from __future__ import annotations
 
 import argparse
-import bz2
-import os
 import tempfile
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
+from bench.common import osm_extracts, unpacked
 from odscen.maps.importers.base import ImportSettings
 from odscen.maps.store import Workspace
 
@@ -38,20 +37,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--reasons", action="store_true")
     options = parser.parse_args()
-    folder = Path(
-        os.environ.get("ODSCEN_TEST_PLACES")
-        or Path(__file__).parents[2] / "shared" / "places" / "osm"
-    )
-    extracts = sorted(folder.glob("*.osm*"))
+    extracts = osm_extracts()
     if not extracts:
-        print(f"skipped: no extracts in {folder} (set ODSCEN_TEST_PLACES)")
         return
     print(f"{'extract':30}{'':18}{'all':>6}", *(f"{fate:>9}" for fate in FATES))
     total: Counter[str] = Counter()
     reasons: Counter[str] = Counter()
     for extract in extracts:
-        content = extract.read_bytes()
-        content = bz2.decompress(content) if extract.suffix == ".bz2" else content
+        content = unpacked(extract)
         rows = _import_rows(extract)
         found = list(_find_elements(content))
         for kind in KINDS:

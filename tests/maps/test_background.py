@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from PIL import Image, TiffImagePlugin
 
 from odscen.base.errors import InputError, LimitError
-from odscen.maps import background
+from odscen.maps import background, map_tiles
 from odscen.maps.allowances import Allowance
 from odscen.maps.background import (
     PicturePoint,
@@ -247,6 +247,22 @@ def test_tiles_lie_where_web_mercator_has_them(tmp_path: Path, kind: str) -> Non
         lon, lat = to_degrees.transform(x, y)
         there = tile_of(lat, lon, zoom)
         assert picture.getpixel((int(column), int(row))) == (there[0] % 256, there[1] % 256, 7)
+
+
+def test_tiles_whose_picture_would_be_too_large_give_way_to_a_lower_zoom(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace, name = georeferenced_map(tmp_path)
+    lon, lat = pyproj.Transformer.from_crs(LOCAL, "EPSG:4326", always_xy=True).transform(0.0, 0.0)
+    for zoom in (15, 18):
+        column, row = tile_of(lat, lon, zoom)
+        file = tmp_path / "tiles" / str(zoom) / str(column) / f"{row}.png"
+        file.parent.mkdir(parents=True)
+        file.write_bytes(colour_tile(column, row, 512))
+    monkeypatch.setattr(map_tiles, "_MOST_SIDE", 512 * 3)
+    under = workspace.set_background(name, tmp_path / "tiles")
+    metres = math.hypot(under.affine[0], under.affine[3])  # of a pixel of zoom 15, at 48 degrees
+    assert metres == pytest.approx(40_075_017 / 2**15 / 512 * math.cos(math.radians(48)), rel=0.01)
 
 
 def test_tiles_that_are_damaged_or_elsewhere_are_refused(tmp_path: Path) -> None:

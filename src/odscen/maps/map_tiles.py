@@ -11,7 +11,7 @@ import io
 import math
 import sqlite3
 import warnings
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,7 +19,10 @@ import numpy as np
 from odscen.base.errors import InputError, MissingDependencyError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
+
+    from PIL import Image
 
     from odscen.base.arrays import Bounds
     from odscen.opendrive.road_model import Header
@@ -75,10 +78,7 @@ def join_tiles(path: Path, header: Header, bounds: Bounds) -> JoinedTiles:
                 math.floor((west + _HALF) / side), math.floor((east + _HALF) / side) + 1
             )
             rows = range(math.floor((_HALF - north) / side), math.floor((_HALF - south) / side) + 1)
-            least = _SIZES[0]
-            if max(len(columns), len(rows)) * least > _MOST_SIDE or (
-                len(columns) * len(rows) * least**2 > _MOST_PIXELS
-            ):
+            if _is_too_large(columns, rows, _SIZES[0]):
                 continue
             tiles = {
                 (column, row): content
@@ -86,10 +86,24 @@ def join_tiles(path: Path, header: Header, bounds: Bounds) -> JoinedTiles:
                 for row in rows
                 if (content := source.read(zoom, column, row)) is not None
             }
-            if tiles:
+            if not tiles:
+                continue
+            if not _is_too_large(columns, rows, _measure_tile(*next(iter(tiles.items())))):
                 corner = (columns.start * side - _HALF, _HALF - rows.start * side)
-                return _join(tiles, columns, rows, side, corner)
+                return _paste_tiles(tiles, columns, rows, side, corner)
     raise InputError("no tile lies under the map")
+
+
+def _is_too_large(columns: range, rows: range, pixels: int) -> bool:
+    """Whether a picture of tiles with so many pixels a side is larger than it may be."""
+    width, height = len(columns) * pixels, len(rows) * pixels
+    return max(width, height) > _MOST_SIDE or width * height > _MOST_PIXELS
+
+
+def _measure_tile(place: tuple[int, int], content: bytes) -> int:
+    """Pixels of a side of a tile."""
+    with _open_tile(place, content) as tile:
+        return int(tile.size[0])
 
 
 def _bounds_in_mercator(header: Header, bounds: Bounds) -> Bounds:
@@ -112,44 +126,55 @@ def _bounds_in_mercator(header: Header, bounds: Bounds) -> Bounds:
     return float(east.min()), float(north.min()), float(east.max()), float(north.max())
 
 
-def _join(
+def _paste_tiles(
     tiles: dict[tuple[int, int], bytes],
     columns: range,
     rows: range,
     side: float,
     corner: tuple[float, float],
 ) -> JoinedTiles:
-    try:
-        from PIL import Image, UnidentifiedImageError
-    except ImportError:
-        raise MissingDependencyError("tiles need Pillow: pip install 'odscen[png]'") from None
+    from PIL import Image
+
     pixels, joined = 0, None
     for (column, row), content in sorted(tiles.items()):
-        name = f"tile {column}/{row}"
-        try:
-            with (
-                warnings.catch_warnings(action="error"),
-                Image.open(io.BytesIO(content), formats=("PNG", "JPEG")) as tile,
-            ):
-                if tile.size not in [(size, size) for size in _SIZES]:
-                    raise InputError(f"{name} has {tile.size[0]} x {tile.size[1]} pixels")
-                if joined is None:
-                    pixels = tile.size[0]
-                    joined = Image.new("RGBA", (len(columns) * pixels, len(rows) * pixels))
-                elif tile.size[0] != pixels:
-                    raise InputError(f"{name} has another size than the others")
-                place = (column - columns.start) * pixels, (row - rows.start) * pixels
-                joined.paste(tile.convert("RGBA"), place)
-        except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Warning) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{name} is no PNG or JPEG that can be read") from error
+        with _open_tile((column, row), content) as tile:
+            if joined is None:
+                pixels = tile.size[0]
+                joined = Image.new("RGBA", (len(columns) * pixels, len(rows) * pixels))
+            elif tile.size[0] != pixels:
+                name = f"tile {column}/{row}"
+                raise InputError(f"{name} has another size than the others")
+            place = (column - columns.start) * pixels, (row - rows.start) * pixels
+            joined.paste(tile.convert("RGBA"), place)
     assert joined is not None
     out = io.BytesIO()
     joined.save(out, "PNG")
     size = side / pixels
     world = (size, 0.0, 0.0, -size, corner[0] + size / 2.0, corner[1] - size / 2.0)
     return JoinedTiles(out.getvalue(), "\n".join(f"{number!r}" for number in world))
+
+
+@contextmanager
+def _open_tile(place: tuple[int, int], content: bytes) -> Iterator[Image.Image]:
+    """Open a tile for as long as it is looked at; whatever fails meanwhile is the tile's fault."""
+    try:
+        from PIL import Image, UnidentifiedImageError
+    except ImportError:
+        raise MissingDependencyError("tiles need Pillow: pip install 'odscen[png]'") from None
+    column, row = place
+    name = f"tile {column}/{row}"
+    try:
+        with (
+            warnings.catch_warnings(action="error"),
+            Image.open(io.BytesIO(content), formats=("PNG", "JPEG")) as tile,
+        ):
+            if tile.size not in [(size, size) for size in _SIZES]:
+                raise InputError(f"{name} has {tile.size[0]} x {tile.size[1]} pixels")
+            yield tile
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError, Warning) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{name} is no PNG or JPEG that can be read") from error
 
 
 def _open_source(path: Path) -> _Folder | _MBTiles:
@@ -182,11 +207,11 @@ class _MBTiles:
         self._connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
 
     def zooms(self) -> list[int]:
-        found = self._select("SELECT DISTINCT zoom_level FROM tiles")
+        found = self._select_rows("SELECT DISTINCT zoom_level FROM tiles")
         return [zoom for (zoom,) in found if isinstance(zoom, int) and 0 <= zoom <= _MOST_ZOOM]
 
     def read(self, zoom: int, column: int, row: int) -> bytes | None:
-        found = self._select(
+        found = self._select_rows(
             "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?",
             (zoom, column, 2**zoom - 1 - row),
         )
@@ -198,7 +223,7 @@ class _MBTiles:
         """Close the file."""
         self._connection.close()
 
-    def _select(self, query: str, values: tuple[int, ...] = ()) -> list[tuple[object, ...]]:
+    def _select_rows(self, query: str, values: tuple[int, ...] = ()) -> list[tuple[object, ...]]:
         try:
             return self._connection.execute(query, values).fetchall()
         except sqlite3.DatabaseError as error:

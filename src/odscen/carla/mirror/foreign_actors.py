@@ -108,8 +108,9 @@ class ForeignActors:
         users, places = [], {}
         for actor in sorted(there, key=lambda actor: actor.id):
             known = self._known[actor.id]
-            height = actor.get_transform().location.z
-            if known is not None and self._lowest <= height <= self._highest:
+            if known is None:
+                continue
+            if self._lowest <= actor.get_transform().location.z <= self._highest:
                 user, place = self._describe_user(actor, known, passed)
                 users.append(user)
                 places[actor.id] = place

@@ -569,7 +569,7 @@ class MirroredPlan:
                 plan.net_offset,
                 on.assets,
                 options.foreign,
-                heights=(float(z.min()), float(z.max())),
+                heights=(float(z.min(initial=np.inf)), float(z.max(initial=-np.inf))),
                 left_out=hero,
             )
         wheels = doors = None

@@ -34,19 +34,11 @@ CAR_PITCH = "pitch of a car"
 STILL_SPEED, LAMPS = "speed reported without physics", "lights of a car"
 SENSED_PLACE, SENSED_SPEED = "place with --sensed-speed", "speed with --sensed-speed"
 FEET, DRIFT = "feet of a walker", "walk of a walker"
-BODY_NAMES = (
-    CAR_LIFT,
-    WALKER_LIFT,
-    CAR_PLACE,
-    CAR_HEIGHT,
-    CAR_PITCH,
-    STILL_SPEED,
-    LAMPS,
-    SENSED_PLACE,
-    SENSED_SPEED,
-    FEET,
-    DRIFT,
-)
+LIFT_NAMES = (CAR_LIFT, WALKER_LIFT)
+CAR_NAMES = (CAR_PLACE, CAR_HEIGHT, CAR_PITCH, STILL_SPEED, LAMPS)
+SENSED_NAMES = (SENSED_PLACE, SENSED_SPEED)
+WALKER_NAMES = (FEET, DRIFT)
+BODY_NAMES = (*LIFT_NAMES, *CAR_NAMES, *SENSED_NAMES, *WALKER_NAMES)
 """In the order in which they are checked."""
 TRIED = (0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.6, 1.2)
 """Metres above the ground at which bodies are tried."""
@@ -169,7 +161,7 @@ class BodyChecks:
         with answering(self.server.address):
             (handle,) = self.server.actors([actor])
             lamps = int(handle.get_light_state())
-        pitch = self._tilt(actor, wanted)
+        pitch = self._tilt_car(actor, wanted)
         self._remove_body(actor)
         turn = abs((seen.yaw - wanted.yaw + 180.0) % 360.0 - 180.0)
         off = math.hypot(seen.x - wanted.x, seen.y - wanted.y)
@@ -314,7 +306,7 @@ class BodyChecks:
             self.server.apply(Batch(move=(Move(actor, at, ahead, SPEED, False),)))
         return at
 
-    def _tilt(self, actor: int, at: ActorPlace) -> float:
+    def _tilt_car(self, actor: int, at: ActorPlace) -> float:
         """Tilt a car where it stands, for two ticks; its pitch then, degrees."""
         for _ in range(2):
             self.server.apply(

@@ -318,16 +318,16 @@ def _run_all_checks(
     bodies = BodyChecks(server, limits, DELTA)
     checks: tuple[Check, ...] = (
         ((RELEASE,), lambda: [release_line(server)]),
-        (_NAMES[:1], lambda: [map_line(server, name, text)]),
-        (_NAMES[1:3], lambda: time_lines(server, DELTA)),
-        (_NAMES[3:4], bodies.prepare),
-        (_NAMES[4:6], bodies.lifts),
-        (_NAMES[6:11], bodies.car),
-        (_NAMES[11:13], bodies.sensed),
-        (_NAMES[13:15], bodies.walker),
-        (_NAMES[15:17], lambda: light_lines(server)),
-        (_NAMES[17:18], lambda: pace_checks.pace_lines(server, limits)),
-        (_NAMES[18:19], lambda: pace_checks.ground_pace_lines(server, limits)),
+        ((MAP,), lambda: [map_line(server, name, text)]),
+        ((FRAMES, SECONDS), lambda: time_lines(server, DELTA)),
+        ((body_checks.GROUND,), bodies.prepare),
+        (body_checks.LIFT_NAMES, bodies.lifts),
+        (body_checks.CAR_NAMES, bodies.car),
+        (body_checks.SENSED_NAMES, bodies.sensed),
+        (body_checks.WALKER_NAMES, bodies.walker),
+        ((SIGNALS, STATES), lambda: light_lines(server)),
+        ((pace_checks.PACE,), lambda: pace_checks.pace_lines(server, limits)),
+        ((pace_checks.GROUND_PACE,), lambda: pace_checks.ground_pace_lines(server, limits)),
     )
     lines: list[CheckLine] = []
     for k, (names, check) in enumerate(checks):

@@ -24,6 +24,8 @@ _SLACK = 0.55 * STEP
 """Half a piece and a little: pieces of a bent line do not quite touch on its outer side."""
 
 _COS = np.cos(np.radians(45.0))
+_CLOSE = 0.05
+"""Metres within which nearly all places have a piece: what is looked at first."""
 _CHUNK = 4000
 _ROUNDING = 1e-3
 
@@ -172,7 +174,7 @@ class Finder:
         row = np.full(len(places.xy), -1, dtype=np.int64)
         todo = np.arange(len(places.xy))
         # Nearly all places have a piece beside them; only the others are worth a wide search.
-        for radius in (0.05, 2.0 * STEP, 3.0, reach):
+        for radius in (_CLOSE, 2.0 * STEP, 3.0, reach):
             limit = min(radius, reach)
             for start in range(0, len(todo), _CHUNK):
                 rows = todo[start : start + _CHUNK]

@@ -219,7 +219,7 @@ class PositionReader:
             edges = np.flatnonzero((ends[0] == node) & (lanes.relation == Relation.SUCCESSOR))
             if edges.size == 0:
                 break
-            edge = self._straightest(node, edges, ends[1])
+            edge = self._find_straightest(node, edges, ends[1])
             following = int(ends[1][edge])
             if following in seen or left < 0.5 * float(lanes.length[edge]):
                 break
@@ -232,7 +232,7 @@ class PositionReader:
                 forks.append(node)
         return node, left if metres >= 0 else -left
 
-    def _straightest(self, node: int, edges: IntArray, others: Int32Array) -> int:
+    def _find_straightest(self, node: int, edges: IntArray, others: Int32Array) -> int:
         """Edge of several whose lane, such as one in a junction, turns least from its begin on."""
         lanes = self.graph.lanes
         if edges.size == 1:

@@ -260,15 +260,12 @@ def curves_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> list[Cubic]
     """
     turn = math.remainder(end.hdg - start.hdg, 2.0 * math.pi)
     if bulge == 0.0 and _TURNS[0] < abs(turn) < _TURNS[1]:
-        dx, dy = end.x - start.x, end.y - start.y
-        cos, sin = math.cos(start.hdg), math.sin(start.hdg)
-        meet = (dy * cos - dx * sin) / math.sin(turn)
-        ahead = dx * cos + dy * sin - meet * math.cos(turn)
+        ahead, meet = _find_tangents(*_in_frame_of(start, end), turn)
         short = min(meet, ahead)
         if short > _SHORTEST_TANGENT and max(meet, ahead) - short > _UNEVEN:
             begins, ends = start.ahead(max(0.0, ahead - short)), end.ahead(-max(0.0, meet - short))
-            straight = [_straight(start, begins)] if ahead > meet else []
-            after = [_straight(ends, end)] if meet > ahead else []
+            straight = [_draw_straight(start, begins)] if ahead > meet else []
+            after = [_draw_straight(ends, end)] if meet > ahead else []
             return [*straight, curve_between(begins, ends), *after]
     curve = [curve_between(start, end, bulge=bulge)]
     if bulge == 0.0 and least_radius(curve) < DRIVABLE:
@@ -286,7 +283,7 @@ def _wider_curves(start: Pose, end: Pose) -> Iterator[list[Cubic]]:
     )
     yield [curve_between(start, between), curve_between(between, end)]
     for first, second in itertools.product(_HANDLES, repeat=2):
-        yield [_bezier(start, end, first * chord, second * chord)]
+        yield [_draw_bezier(start, end, first * chord, second * chord)]
 
 
 def least_radius(parts: Sequence[Cubic]) -> float:
@@ -297,11 +294,25 @@ def least_radius(parts: Sequence[Cubic]) -> float:
         (_, b, c, d), (_, e, f, g) = part.u, part.v
         du, dv = b + 2 * c * p + 3 * d * p * p, e + 2 * f * p + 3 * g * p * p
         ddu, ddv = 2 * c + 6 * d * p, 2 * f + 6 * g * p
-        bends.append(float((np.abs(du * ddv - dv * ddu) / np.hypot(du, dv) ** 3).max()))
+        speed = np.maximum(np.hypot(du, dv), 1e-6)  # 0 where a handle has no length
+        bends.append(float((np.abs(du * ddv - dv * ddu) / speed**3).max()))
     return 1.0 / max(*bends, 1e-9)
 
 
-def _straight(start: Pose, end: Pose) -> Cubic:
+def _in_frame_of(start: Pose, end: Pose) -> tuple[float, float]:
+    """Metres ahead and to the left of a pose at which another one is."""
+    dx, dy = end.x - start.x, end.y - start.y
+    cos, sin = math.cos(start.hdg), math.sin(start.hdg)
+    return dx * cos + dy * sin, dy * cos - dx * sin
+
+
+def _find_tangents(u: float, v: float, turn: float) -> tuple[float, float]:
+    """Metres along both tangents of a turn, from its start and its end, to where they meet."""
+    meet = v / math.sin(turn)
+    return u - meet * math.cos(turn), meet
+
+
+def _draw_straight(start: Pose, end: Pose) -> Cubic:
     length = math.hypot(end.x - start.x, end.y - start.y)
     return Cubic(start, length, (0.0, length, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
 
@@ -312,9 +323,7 @@ def curve_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> Cubic:
     ``4/3 tan(turn / 4)`` radii; ``bulge`` makes them at least so long, metres, which widens a turn
     back.
     """
-    dx, dy = end.x - start.x, end.y - start.y
-    cos, sin = math.cos(start.hdg), math.sin(start.hdg)
-    u, v = dx * cos + dy * sin, dy * cos - dx * sin
+    u, v = _in_frame_of(start, end)
     turn = math.remainder(end.hdg - start.hdg, 2.0 * math.pi)
     chord, half = math.hypot(u, v), abs(turn) / 2.0
     handle = chord / 3.0
@@ -325,19 +334,16 @@ def curve_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> Cubic:
     # are those of two tangents that meet.
     first = second = handle
     if math.radians(20) < abs(turn) < math.radians(160):
-        meet = v / math.sin(turn)  # along the end's tangent, back to where the tangents meet
-        ahead = u - meet * math.cos(turn)
+        ahead, meet = _find_tangents(u, v, turn)
         if min(meet, ahead) > 0.2 * chord:
             factor = 4.0 / 3.0 * math.tan(abs(turn) / 4) / math.tan(abs(turn) / 2)
             first, second = max(factor, 0.55) * ahead, max(factor, 0.55) * meet
-    return _bezier(start, end, first, second)
+    return _draw_bezier(start, end, first, second)
 
 
-def _bezier(start: Pose, end: Pose, first: float, second: float) -> Cubic:
+def _draw_bezier(start: Pose, end: Pose, first: float, second: float) -> Cubic:
     """The cubic Bezier curve from pose to pose with handles of these lengths, metres."""
-    dx, dy = end.x - start.x, end.y - start.y
-    cos, sin = math.cos(start.hdg), math.sin(start.hdg)
-    u, v = dx * cos + dy * sin, dy * cos - dx * sin
+    u, v = _in_frame_of(start, end)
     turn = end.hdg - start.hdg
     out = (u - second * math.cos(turn), v - second * math.sin(turn))
     p0, p1, p2, p3 = np.array([(0.0, 0.0), (first, 0.0), out, (u, v)])

@@ -59,7 +59,7 @@ class GroundPaces:
         pace = self._paces.get(actor.id)
         if pace is None:
             pace = self._paces[actor.id] = _Pace(x, y, 0.0, 0.0)
-        self._measure(pace, math.hypot(x - pace.x, y - pace.y))
+        self._measure_share(pace, math.hypot(x - pace.x, y - pace.y))
         back = min(max(pace.owed, -_BACK * metres), _BACK * metres)
         given = (metres + back) / pace.share if metres > 0.0 else 0.0
         pace.x, pace.y, pace.wanted, pace.given = x, y, metres, given
@@ -67,7 +67,7 @@ class GroundPaces:
         return given / self._step
 
     @staticmethod
-    def _measure(pace: _Pace, covered: float) -> None:
+    def _measure_share(pace: _Pace, covered: float) -> None:
         """Take over what was covered on the ground in the last step."""
         if abs(covered - pace.wanted) > _MOST * pace.wanted:
             pace.owed = 0.0
