@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import polars as pl
 import pytest
 from playwright.sync_api import Page, expect
 
+from odscen.app.exchange.kept_recordings import SEARCHED_AT_ONCE
 from tests.browser.clipped_text import clipped_texts
 from tests.browser.pages import OdscenPage
 from tests.browser.test_accessibility import AXE
@@ -16,6 +18,8 @@ from tests.browser.test_openscenario import drop
 from tests.formats.tracks.test_tracks_on_maps import crossing_traffic
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from tools import page as tool
 
 MOST_CLICKS = 15
@@ -65,6 +69,60 @@ def test_a_dropped_recording_becomes_a_scene_that_is_run_and_judged(opened: Odsc
     actions = opened.actions()
     assert actions["key"] == 0
     assert actions["pointer"] <= MOST_CLICKS
+
+
+@pytest.mark.slow
+def test_a_scene_is_chosen_made_run_and_judged_by_keys(opened: OdscenPage) -> None:
+    page = opened.page
+    first = page.get_by_role("list", name="Scenes").get_by_role("button", name="Cut-in").first
+    first.focus()
+    page.keyboard.press("Enter")
+    expect(first).to_have_attribute("aria-pressed", "true")
+    page.get_by_role("button", name="Make a scenario").focus()
+    page.keyboard.press("Enter")
+    opened.wait_for_editor()
+    opened.step("Run").focus()
+    page.keyboard.press("Enter")
+    opened.run.focus()
+    page.keyboard.press("Enter")
+    expect(opened.result).to_be_visible()
+    judged = page.get_by_role("region", name="Criteria")
+    expect(judged).to_contain_text("collide")
+    actions = opened.actions()
+    assert actions["pointer"] == 0
+    assert actions["key"] <= MOST_CLICKS
+
+
+@pytest.mark.slow
+def test_a_large_recording_says_how_far_the_search_for_scenes_is(
+    served: tool.Served, open_page: Callable[..., OdscenPage], tmp_path: Path
+) -> None:
+    # 17 MB: the same traffic again and again, so that scenes are looked for when it is shown.
+    traffic = crossing_traffic()
+    again = [
+        traffic.with_columns(
+            id=pl.col("id") + f"-{k}", time=pl.col("time") + 20.0 * k
+        ) for k in range(430)
+    ]  # fmt: skip
+    file = tmp_path / "large.csv"
+    pl.concat(again).write_csv(file)
+    assert file.stat().st_size > SEARCHED_AT_ONCE
+    user = open_page(served.url)
+    user.open_catalogue()
+    page = user.page
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Open a recording").click()
+    chooser.value.set_files(file)
+    expect(page.get_by_role("heading", name="large.csv")).to_be_visible(timeout=60_000)
+    strip = page.get_by_role("region", name="Time of the recording")
+    expect(strip.locator(".figure").filter(has_text="On the road").locator("b")).to_have_text("3")
+    scenes = page.get_by_role("list", name="Scenes")
+    expect(
+        page.get_by_role("progressbar", name="Progress of the search for scenes").or_(scenes)
+    ).to_be_visible()
+    expect(scenes).to_be_visible(timeout=120_000)
+    expect(page.get_by_text("Cut-in (430)")).to_be_visible()
+    expect(page.get_by_text("at most 4 at once")).to_be_visible()
 
 
 @pytest.mark.slow

@@ -22,10 +22,10 @@ from tools.make_maps.town_grid import EAST, NORTH, Node, TownGrid, draw_offsets
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-COUNT = 32
+COUNT = 72
 """Towns that have a name."""
-ARTERIAL = 24
-"""Seed from which on streets have up to four lanes each way, and junctions are far apart."""
+ARTERIAL = range(24, 32)
+"""Seeds whose streets have up to four lanes each way, and whose junctions are far apart."""
 STYLES = ("lights", "none", "signs", "mixed")
 """How junctions are ruled: each second of the unruled ones is wide."""
 
@@ -71,7 +71,7 @@ def varied_town(name: str) -> Builder:
 
 
 def _drawn(rng: random.Random, seed: int) -> VariedGrid:
-    arterial = seed >= ARTERIAL
+    arterial = seed in ARTERIAL
     most = 3 if arterial else 5
     columns, rows = rng.randint(3, most), rng.randint(3, most)
     long = rng.choice((180.0, 300.0, 450.0) if arterial else (90.0, 130.0, 200.0))

@@ -1,7 +1,7 @@
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { Alert, Button, Group, Loader, Modal, Select, Text } from "@mantine/core";
-import { useCallback, useState } from "react";
+import { memo, useCallback, useState } from "react";
 
 import { api } from "../api/client";
 import { type MapAgreement, recordings, type RecordingInfo } from "../api/recordings";
@@ -18,7 +18,13 @@ const percent = (share: number): string => `${fixed(100 * share, 1)} %`;
 const POOR = 0.8;
 
 /** The map of a recording, how well both agree, and the choice of another one. */
-export function MapFit({ info, onPlaced }: { info: RecordingInfo; onPlaced: () => void }) {
+export const MapFit = memo(function MapFit({
+  info,
+  onPlaced,
+}: {
+  info: RecordingInfo;
+  onPlaced: () => void;
+}) {
   const { name, map } = info;
   const maps = useLoaded(api.maps);
   const fits = useLoaded(useCallback(() => recordings.maps(name), [name]));
@@ -89,7 +95,12 @@ export function MapFit({ info, onPlaced }: { info: RecordingInfo; onPlaced: () =
             </Text>
           )}
           <Group gap="xs" mt="xs">
-            <Button size="compact-sm" variant="default" onClick={() => setPicture(true)}>
+            <Button
+              size="compact-sm"
+              variant="default"
+              disabled={!info.searched}
+              onClick={() => setPicture(true)}
+            >
               <Trans>Picture of the agreement</Trans>
             </Button>
             <Button
@@ -114,7 +125,7 @@ export function MapFit({ info, onPlaced }: { info: RecordingInfo; onPlaced: () =
       </Modal>
     </>
   );
-}
+});
 
 function Agreement({ of, title, places }: { of: MapAgreement; title: string; places: string }) {
   const { on_lane: share, wrong_way: wrong, offset_95: far } = of;

@@ -1,7 +1,7 @@
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { Button, Radio, Select, Stack, Text } from "@mantine/core";
-import { useState } from "react";
+import { memo, useState } from "react";
 
 import { type Follow, recordings, type RecordingInfo } from "../api/recordings";
 import { fixed } from "../language/numbers";
@@ -12,7 +12,7 @@ import type { Part } from "./window";
 import { FOLLOWS, recordedTime } from "./words";
 
 /** What becomes of the part that is chosen: who is the ego, and what the others do. */
-export function PartForm({
+export const PartForm = memo(function PartForm({
   info,
   part,
   ego,
@@ -80,4 +80,4 @@ export function PartForm({
       )}
     </Stack>
   );
-}
+});

@@ -25,6 +25,7 @@ import { MapFit } from "./MapFit";
 import { RecordedMoments } from "./moments";
 import { PartForm } from "./PartForm";
 import { SceneList } from "./SceneList";
+import { SceneSearch } from "./SceneSearch";
 import { TimeBar } from "./TimeBar";
 import { type Part, partBetween, partOf } from "./window";
 import { egoOf, KINDS, recordedTime } from "./words";
@@ -107,7 +108,8 @@ function Shown({ info, onPlaced }: { info: RecordingInfo; onPlaced: () => void }
   countFrom(0);
 
   const [come, setCome] = useState(0);
-  const moments = useMemo(() => new RecordedMoments(info, () => setCome((n) => n + 1), tellError), [info]);
+  // Where they were does not change while its scenes are looked for.
+  const [moments] = useState(() => new RecordedMoments(info, () => setCome((n) => n + 1), tellError));
   const show = useCallback(
     (time: number) => {
       const found = moments.at(time);
@@ -121,7 +123,7 @@ function Shown({ info, onPlaced }: { info: RecordingInfo; onPlaced: () => void }
   );
   const player = usePlaying(info, show);
   const { time, seek, start, pause } = player;
-  useEffect(() => start(info.begin), [start, info]);
+  useEffect(() => start(info.begin), [start, info.begin]);
   useEffect(() => show(time), [show, time, come, ego, ground.value]);
   const placed = useRef(false);
   useEffect(() => {
@@ -137,15 +139,18 @@ function Shown({ info, onPlaced }: { info: RecordingInfo; onPlaced: () => void }
     [chosen],
   );
   useEffect(() => handle.current?.setMarks(marks), [marks, ground.value]);
-  const choose = (scene: RecordedScene): void => {
-    setChosen(scene);
-    setPart(partOf(scene, info));
-    const wanted = egoOf(scene);
-    setEgo(wanted);
-    pause();
-    seek(scene.begin);
-    handle.current?.reveal(scene.x, scene.y);
-  };
+  const choose = useCallback(
+    (scene: RecordedScene): void => {
+      setChosen(scene);
+      setPart(partOf(scene, info));
+      const wanted = egoOf(scene);
+      setEgo(wanted);
+      pause();
+      seek(scene.begin);
+      handle.current?.reveal(scene.x, scene.y);
+    },
+    [info, pause, seek],
+  );
   const pick = ({ x, y, reach }: Pointed): void => {
     if (!last.current) return;
     const { crowd, moving } = last.current;
@@ -207,6 +212,7 @@ function Shown({ info, onPlaced }: { info: RecordingInfo; onPlaced: () => void }
               <Title order={2} size="h5" id="recording-scenes" mt="lg" mb={6}>
                 <Trans>Scenes found</Trans>
               </Title>
+              {!info.searched && <SceneSearch recording={info.name} onSearched={onPlaced} />}
               <SceneList
                 info={info}
                 kinds={kinds}

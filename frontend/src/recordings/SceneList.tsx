@@ -1,6 +1,7 @@
 import { t } from "@lingui/core/macro";
 import { Trans } from "@lingui/react/macro";
 import { Chip, Group, Text } from "@mantine/core";
+import { memo } from "react";
 
 import type { RecordedScene, RecordingInfo, SceneKind } from "../api/recordings";
 import { fixed } from "../language/numbers";
@@ -10,7 +11,7 @@ import { KIND_COLOR, KIND_WORD, KINDS, recordedTime, valueText, whoText } from "
 const MOST = 300;
 
 /** Scenes that were found, by kind and time; one that is chosen becomes the part and its ego. */
-export function SceneList({
+export const SceneList = memo(function SceneList({
   info,
   kinds,
   onKinds,
@@ -27,6 +28,7 @@ export function SceneList({
   onChoose: (scene: RecordedScene) => void;
 }) {
   const there = KINDS.flatMap((kind) => info.frequencies.filter((one) => one.kind === kind));
+  if (!info.searched) return null;
   if (there.length === 0)
     return (
       <Text size="sm" c="dimmed">
@@ -74,4 +76,4 @@ export function SceneList({
       )}
     </>
   );
-}
+});

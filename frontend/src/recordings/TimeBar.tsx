@@ -1,9 +1,9 @@
 import { t } from "@lingui/core/macro";
-import { type KeyboardEvent, type PointerEvent, useMemo, useRef } from "react";
+import { type KeyboardEvent, memo, type PointerEvent, useMemo, useRef } from "react";
 
 import type { RecordedScene, RecordingInfo } from "../api/recordings";
 import { useWidth } from "../time/useWidth";
-import { density } from "./moments";
+import { density, mostAtOnce } from "./moments";
 import { type Part, movedEnd, partBetween } from "./window";
 import { KIND_COLOR, KIND_WORD, KINDS, recordedTime } from "./words";
 
@@ -41,7 +41,7 @@ export function TimeBar({
     const points = counts.map(
       (n, k) => `${(100 * (k + 0.5)) / counts.length},${HEIGHT - ((HEIGHT - 4) * n) / most}`,
     );
-    return { most, path: `0,${HEIGHT} ${points.join(" ")} 100,${HEIGHT}` };
+    return { most: mostAtOnce(users), path: `0,${HEIGHT} ${points.join(" ")} 100,${HEIGHT}` };
   }, [users, begin, end, width]);
   const timeAt = (event: PointerEvent): number => {
     const box = event.currentTarget.getBoundingClientRect();
@@ -121,19 +121,7 @@ export function TimeBar({
           aria-hidden="true"
           style={{ left: `${share(part.begin)}%`, width: `${share(part.end) - share(part.begin)}%` }}
         />
-        <div className="rec-marks" aria-hidden="true">
-          {scenes.map((scene, n) => (
-            <i
-              key={n}
-              title={`${KIND_WORD()[scene.kind]}, ${said(scene.begin)}`}
-              style={{
-                left: `${share(scene.begin)}%`,
-                top: 2 + 6 * KINDS.indexOf(scene.kind),
-                background: KIND_COLOR[scene.kind],
-              }}
-            />
-          ))}
-        </div>
+        <Marks info={info} scenes={scenes} />
         <b className="rec-now" aria-hidden="true" style={{ left: `${share(time)}%` }} />
         {handle("begin", t`Begin of the part`)}
         {handle("end", t`End of the part`)}
@@ -154,3 +142,29 @@ export function TimeBar({
     </div>
   );
 }
+
+/** Marks of the scenes: as many as 10,000, which are not to be made anew with each moment. */
+const Marks = memo(function Marks({
+  info,
+  scenes,
+}: {
+  info: RecordingInfo;
+  scenes: readonly RecordedScene[];
+}) {
+  const seconds = Math.max(info.end - info.begin, 1e-6);
+  return (
+    <div className="rec-marks" aria-hidden="true">
+      {scenes.map((scene, n) => (
+        <i
+          key={n}
+          title={`${KIND_WORD()[scene.kind]}, ${recordedTime(info, scene.begin)}`}
+          style={{
+            left: `${(100 * (scene.begin - info.begin)) / seconds}%`,
+            top: 2 + 6 * KINDS.indexOf(scene.kind),
+            background: KIND_COLOR[scene.kind],
+          }}
+        />
+      ))}
+    </div>
+  );
+});

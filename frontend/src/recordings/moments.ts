@@ -52,8 +52,11 @@ export function unpackMoments(
  */
 export class RecordedMoments {
   private overview: Replay | null = null;
-  private readonly parts = new Map<number, Replay | null>();
+  private readonly parts = new Map<number, Replay>();
   private readonly seconds: number;
+  /** The part that is looked at now, and whether one is being fetched: of those passed by none is. */
+  private wanted = -1;
+  private fetching = false;
 
   constructor(
     private readonly info: RecordingInfo,
@@ -79,28 +82,30 @@ export class RecordedMoments {
   }
 
   private want(number: number): void {
-    if (this.parts.has(number)) return;
+    this.wanted = number;
     // Before the overview has come, it is what is waited for.
-    if (this.overview === null) return;
-    this.parts.set(number, null);
-    for (const old of this.parts.keys()) {
-      if (this.parts.size <= KEPT) break;
-      if (old !== number) this.parts.delete(old);
-    }
+    if (this.parts.has(number) || this.fetching || this.overview === null) return;
     const begin = this.info.begin + number * this.seconds;
     void this.fetchPart(number, begin, begin + this.seconds, MOST_PART);
   }
 
   private async fetchPart(number: number, begin: number, end: number, most: number): Promise<void> {
     const { name, users, origin } = this.info;
+    this.fetching = true;
     try {
       const data = await this.load(recordings.momentsUrl(name, begin, end, most));
       const part = new Replay(unpackMoments(data, users, origin));
       if (number < 0) this.overview = part;
       else this.parts.set(number, part);
+      for (const old of this.parts.keys()) {
+        if (this.parts.size <= KEPT) break;
+        if (old !== number) this.parts.delete(old);
+      }
+      this.fetching = false;
       this.onPart();
+      if (this.wanted >= 0) this.want(this.wanted);
     } catch (error) {
-      this.parts.delete(number);
+      this.fetching = false;
       this.onError(error);
     }
   }
@@ -122,4 +127,16 @@ export function density(users: Users, begin: number, end: number, parts: number)
     for (let part = from; part <= to; part++) found[part] = (found[part] ?? 0) + 1;
   }
   return found;
+}
+
+/** How many road users are there at one time, at most. */
+export function mostAtOnce(users: Users): number {
+  const begins = Float64Array.from(users, ({ begin }) => begin).sort();
+  const ends = Float64Array.from(users, ({ end }) => end).sort();
+  let [most, gone] = [0, 0];
+  begins.forEach((begin, come) => {
+    while ((ends[gone] ?? Infinity) < begin) gone += 1;
+    most = Math.max(most, come + 1 - gone);
+  });
+  return most;
 }

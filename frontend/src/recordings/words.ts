@@ -11,6 +11,7 @@ export const KINDS: readonly SceneKind[] = [
   "short_ttc",
   "hard_braking",
   "crossing_pedestrian",
+  "unprotected_left",
   "lane_change",
 ];
 
@@ -19,6 +20,7 @@ export const KIND_WORD = localized((): Record<SceneKind, string> => ({
   short_ttc: t`Short time to collision`,
   hard_braking: t`Hard braking`,
   crossing_pedestrian: t`Crossing pedestrian`,
+  unprotected_left: t`Turn across oncoming traffic`,
   lane_change: t`Lane change`,
 }));
 
@@ -28,6 +30,7 @@ export const KIND_COLOR: Record<SceneKind, string> = {
   short_ttc: "#e03131",
   hard_braking: "#e8590c",
   crossing_pedestrian: "#1c7ed6",
+  unprotected_left: "#2f9e44",
   lane_change: "#868e96",
 };
 
@@ -58,12 +61,12 @@ export const FOLLOWS = localized((): { value: Follow; label: string; text: strin
   {
     value: "react",
     label: t`Follow, then react`,
-    text: t`The others follow their tracks until the ego is less than 6 m away or 3 s from a collision; then SUMO drives them.`,
+    text: t`The other vehicles follow their tracks until the ego is less than 6 m away or 3 s from a collision; then SUMO drives them. Pedestrians follow their tracks.`,
   },
   {
     value: "drive",
     label: t`Drive themselves`,
-    text: t`The others start where they were recorded, at their recorded speeds, and are driven by SUMO.`,
+    text: t`The other vehicles start where they were recorded, at their recorded speeds, and are driven by SUMO. Pedestrians follow their tracks.`,
   },
 ]);
 

@@ -13,7 +13,9 @@ import odscen
 from odscen.app.exchange.exports import export_run
 from odscen.records.run_plan import Plan
 from odscen.runs import layout
+from odscen.sumo.runner.long_runs import resume
 from tests.formats.tracks.test_tracks_on_maps import ROOT, STEP, track, worst_departure
+from tests.sumo.conftest import start_killed_workers
 
 pytestmark = pytest.mark.slow
 
@@ -124,3 +126,75 @@ def test_tracks_are_followed_exactly_in_a_run_in_slices_and_in_its_export(
         begin = -110.0 if x[0] > -125.0 else -140.0
         assert np.abs(x - (begin + 10.0 * (time - STEP))).max() < 0.02
         assert math.isclose(time[0], STEP, abs_tol=0.1)
+
+
+@pytest.mark.parametrize("schema", ["interaction", "ind"])
+def test_tracks_are_followed_exactly_in_a_run_that_was_killed_and_resumed(
+    workspace: odscen.Workspace,
+    pair: Path,
+    schema: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scenario = odscen.import_file(workspace, pair, on_map="signal_crossing").scenario
+    assert scenario is not None
+    settings = odscen.RunSettings(slice_length=3.0)
+    with monkeypatch.context() as patch:
+        start_killed_workers(patch)
+        patch.setenv("KILL_AT", "9")
+        killed = odscen.run(workspace, scenario, out=tmp_path / "run", settings=settings)
+    assert "SIGKILL" in killed.summary["error"]
+    assert resume(killed.folder).status == "completed"
+    run = odscen.Run.open(killed.folder)
+    rows = odscen.read_recorded_traffic(pair).rows
+    assert max(worst_departure(run, rows, STEP).values()) < 0.02
+    export_run(workspace, run.folder, tmp_path / "out", to="recording", options={"schema": schema})
+    table = next((tmp_path / "out").rglob("00_tracks.csv" if schema == "ind" else "vehicle_*.csv"))
+    again = odscen.read_recorded_traffic(table).rows
+    for (_,), own in again.group_by("id", maintain_order=True):
+        time, x = own["time"].to_numpy(), own["x"].to_numpy()
+        begin = -110.0 if x[0] > -125.0 else -140.0
+        assert np.abs(x - (begin + 10.0 * (time - STEP))).max() < 0.02
+
+
+def test_pedestrians_who_turn_over_corners_follow_their_tracks(
+    workspace: odscen.Workspace, tmp_path: Path
+) -> None:
+    """SUMO ended in a fault where it took a walking area that was not on their way."""
+    scenario = ROOT / "suites" / "scenarios" / "signal_crossing.scenario.json"
+    settings = odscen.RunSettings(until=60.0, step_length=0.1)
+    run = odscen.run(workspace, scenario, out=tmp_path / "run", settings=settings)
+    rows = odscen.read_recorded_traffic(run.folder).rows
+    walkers = rows.filter(pl.col("category") == "pedestrian")
+    assert walkers["id"].n_unique() >= 5
+    walkers.write_parquet(tmp_path / "walkers.parquet")
+    read = odscen.import_file(workspace, tmp_path / "walkers.parquet", on_map="signal_crossing")
+    assert read.scenario is not None
+    again = odscen.run(workspace, read.scenario, out=tmp_path / "again")
+    assert again.status == "completed"
+    later = 0.1 - float(walkers["time"].min())  # type: ignore[arg-type]
+    worst = worst_departure(again, walkers, later)
+    assert len(worst) == walkers["id"].n_unique()
+    assert max(worst.values()) < 0.02
+
+
+def test_pedestrians_follow_their_tracks_where_vehicles_react_to_the_ego(
+    workspace: odscen.Workspace, tmp_path: Path
+) -> None:
+    scenario = ROOT / "suites" / "scenarios" / "signal_crossing.scenario.json"
+    settings = odscen.RunSettings(until=60.0, step_length=0.1)
+    run = odscen.run(workspace, scenario, out=tmp_path / "run", settings=settings)
+    rows = odscen.read_recorded_traffic(run.folder).rows
+    rows.write_parquet(tmp_path / "all.parquet")
+    walkers = rows.filter(pl.col("category") == "pedestrian")
+    ego = rows.filter(pl.col("category") == "car")["id"][0]
+    read = odscen.import_file(
+        workspace, tmp_path / "all.parquet", on_map="signal_crossing",
+        options={"ego": ego, "follow": "react"},
+    )  # fmt: skip
+    assert read.scenario is not None
+    again = odscen.run(workspace, read.scenario, out=tmp_path / "again")
+    assert again.status == "completed"
+    worst = worst_departure(again, walkers, 0.1 - float(rows["time"].min()))  # type: ignore[arg-type]
+    assert len(worst) == walkers["id"].n_unique()
+    assert max(worst.values()) < 0.02

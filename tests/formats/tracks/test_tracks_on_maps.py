@@ -237,7 +237,8 @@ def test_the_ego_is_free_and_the_others_react_or_drive(
     react = imported(ego="behind", follow="react")
     assert [actor.id for actor in react.actors if actor.ego] == ["behind"]
     assert {rule.actor for rule in react.rules} == {"brakes", "cuts", "walks"}
-    assert {rule.id for rule in react.rules} >= {"track-cuts", "react-cuts"}
+    assert {rule.id for rule in react.rules} >= {"track-cuts", "react-cuts", "track-walks"}
+    assert "react-walks" not in {rule.id for rule in react.rules}
     ego = next(actor for actor in react.actors if actor.ego)
     assert (ego.depart, ego.initial_speed, ego.speed) == pytest.approx((STEP, 6.0, 6.0))
     drive = imported(ego="behind", follow="drive")
@@ -246,6 +247,25 @@ def test_the_ego_is_free_and_the_others_react_or_drive(
     assert brakes.speed == pytest.approx(12.0, abs=0.01)
     with pytest.raises(odscen.InputError, match=r"no road user 'van' .* brakes, cuts, walks"):
         imported(ego="van")
+
+
+def test_who_comes_into_view_where_another_one_did_has_a_node_of_its_own(
+    workspace: odscen.Workspace, tmp_path: Path
+) -> None:
+    t = np.arange(0.0, 6.0, STEP)
+    cars = [
+        track(f"car-{k}", "car", 4.0 * k + t, -120.0 + 8.0 * t, np.zeros_like(t), (4.5, 1.8))
+        for k in range(3)
+    ]
+    file = tmp_path / "platoon.csv"
+    pl.concat(cars).write_csv(file)
+    read = odscen.import_file(workspace, file, on_map="signal_crossing")
+    assert read.scenario is not None
+    assert [problem for problem in read.problems if problem.severity == "error"] == []
+    assert len({actor.spawn for actor in read.scenario.actors}) == 3
+    run = odscen.run(workspace, read.scenario, out=tmp_path / "run")
+    rows = odscen.read_recorded_traffic(file).rows
+    assert max(worst_departure(run, rows, STEP).values()) < 0.02
 
 
 @pytest.mark.slow

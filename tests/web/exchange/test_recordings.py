@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import json
 import struct
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from odscen.app.doctor import examine
 from odscen.app.exchange import kept_recordings
 from odscen.app.exchange.imports import DiskFile
 from odscen.base.errors import InputError, LimitError
 from odscen.base.folder_locks import locked
+from odscen.cli.commands import command_line
+from odscen.formats.tracks import table_schemas
 from odscen.formats.tracks.read_recording import choose_recording
 from odscen.maps.store import Workspace
-from tests.formats.tracks.test_tracks_on_maps import crossing_traffic
+from odscen.web.exchange import recording_routes
+from tests.formats.tracks.test_tracks_on_maps import SHARED, crossing_traffic
 from tests.web.conftest import job as result_of
 
 if TYPE_CHECKING:
@@ -230,7 +235,7 @@ def test_of_a_recording_with_too_much_a_part_is_kept_or_asked_for(
     workspace: Workspace, recording: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = workspace.recordings / recording
-    place = {"folder": str(folder), "workspace": str(workspace.root), "find": False, "added": []}
+    place = {"folder": str(folder), "workspace": str(workspace.root)}
     more = {"map_name": "signal_crossing", "offset": "", "estimate": False}
     monkeypatch.setattr(kept_recordings, "MOST_SCENES", 1)
     kept_recordings.place_kept_recording(**place, **more, progress=lambda *_: None)
@@ -240,9 +245,9 @@ def test_of_a_recording_with_too_much_a_part_is_kept_or_asked_for(
     (folder / "files").mkdir()
     crossing_traffic().write_csv(folder / "files" / "t.csv")
     monkeypatch.setattr(kept_recordings, "MOST_USERS", 3)
-    with pytest.raises(LimitError, match=r"t\.csv: 4 road users are more than 3; send a part"):
+    with pytest.raises(LimitError, match=r"t\.csv: it has more than 3 road users; send a part"):
         kept_recordings.read_sent_recording(
-            folder=str(folder), names=["t.csv"], progress=lambda *_: None
+            folder=str(folder), names=["t.csv"], find_in=None, progress=lambda *_: None
         )
 
 
@@ -253,3 +258,120 @@ def test_what_is_no_recording_is_refused_with_its_place(client: TestClient) -> N
     job = send(client, {"road.xodr": b"<OpenDRIVE/>"})
     assert "no recorded traffic was sent" in job["error"]["message"]
     assert client.get("/api/recordings").json() == []
+
+
+@pytest.mark.slow
+def test_a_large_recording_is_there_before_its_scenes_are(
+    client: TestClient, recording: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_once = client.get(f"/api/recordings/{recording}").json()
+    monkeypatch.setattr(recording_routes, "SEARCHED_AT_ONCE", 0)
+    monkeypatch.setattr(table_schemas, "LARGE_TABLE", 0)
+    begun = threading.Event()
+    search = kept_recordings.search_recording
+
+    def search_when_asked(*args: Any, **more: Any) -> Any:
+        assert begun.wait(60)
+        return search(*args, **more)
+
+    monkeypatch.setattr(recording_routes, "search_recording", search_when_asked)
+    name = send(client, {"crossing.csv": crossing_traffic().write_csv().encode()})["result"]
+    first = client.get(f"/api/recordings/{name}").json()
+    assert (first["searched"], first["scenes"], first["vehicles"]) == (False, [], None)
+    assert (first["map"], first["users"]) == (at_once["map"], at_once["users"])
+    shown = client.get(f"/api/recordings/{name}/moments").content
+    assert shown == client.get(f"/api/recordings/{recording}/moments").content
+    assert client.get(f"/api/recordings/{name}/picture").status_code == 404
+    # The one that has begun is joined.
+    jobs = [client.post(f"/api/recordings/{name}/search") for _ in range(2)]
+    assert jobs[0].json() == jobs[1].json()
+    begun.set()
+    assert result_of(client, jobs[0])["state"] == "done"
+    then = client.get(f"/api/recordings/{name}").json()
+    assert then["searched"]
+    for key in ("scenes", "vehicles", "frequencies", "bounds", "users", "origin"):
+        assert then[key] == at_once[key], key
+    assert client.get(f"/api/recordings/{name}/moments").content == shown
+
+
+FOLDERS = {
+    "av2": (["scenario_0a1e6f0a.parquet", "log_map_archive_0a1e6f0a.json"], 44, "vehicles", 0.4),
+    "commonroad": (["USA_Lanker-1_1_T-1.xml"], 24, "vehicles", 1.0),
+    "interaction": (["vehicle_tracks_000.csv", "TestScenarioForScripts.osm"], 2, "vehicles", 1.0),
+    "omega-prime": (["pedestrian.osi", "fabriksgatan.xodr"], 2, "vehicles", 1.0),
+    "sind": (
+        ["Ped_smoothed_tracks.csv", "Traffic_Lights.csv", "Xian_Shanglin.osm"],
+        16, "pedestrians", 0.0,
+    ),
+}  # fmt: skip
+"""Files of each folder, road users, and the share of states of a kind on lanes (walks) at least:
+vehicles of the map of Argoverse 2 are parked beside its lanes or leave it, SinD's has no walks."""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not SHARED.is_dir(), reason="needs the recordings of ../shared")
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_recordings_of_others_are_located_and_looked_at_by_time(
+    client: TestClient, folder: str
+) -> None:
+    names, users, kind, on_lane = FOLDERS[folder]
+    job = send(client, {name: (SHARED / folder / name).read_bytes() for name in names})
+    assert job["state"] == "done", job
+    info = client.get(f"/api/recordings/{job['result']}").json()
+    assert info["map"] is not None
+    assert len(info["users"]) == users
+    assert info[kind]["on_lane"] >= on_lane
+    times, first, rows = moments(client.get(f"/api/recordings/{job['result']}/moments").content)
+    assert (times[0], times[-1]) == pytest.approx((info["begin"], info["end"]), abs=0.002)
+    low, high = np.array(info["bounds"]).reshape(2, 2) - info["origin"]
+    assert (rows[:, 1:3] >= low - 0.01).all()
+    assert (rows[:, 1:3] <= high + 0.01).all()
+    assert {int(user) for user in rows[:, 0]} == set(range(users))
+    assert first[-1] == len(rows)
+
+
+def test_a_form_that_is_damaged_or_has_no_room_is_refused(
+    client: TestClient, workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def send_form(body: bytes, kind: str = "multipart/form-data; boundary=b") -> Any:
+        return client.post("/api/recordings", content=body, headers={"Content-Type": kind})
+
+    head = b'--b\r\nContent-Disposition: form-data; name="files"; filename="../../t.csv"\r\n\r\n'
+    assert send_form(b"{}", "application/json").status_code == 422
+    for body, words in (
+        (b"no form", "the form is damaged"),
+        (head + b"time,x,y\n", "the form ends too early"),
+        (b'--b\r\nContent-Disposition: form-data; name="map"\r\n\r\nm\r\n--b--\r\n', "no files"),
+        (41 * (head + b"x\r\n") + b"--b--\r\n", "more than 40 files"),
+    ):
+        refused = send_form(body)
+        assert refused.status_code == 422, refused.text
+        assert words in refused.text
+    job = result_of(client, send_form(head + b"time,x,y\n0,1,2\n1,3,2\n\r\n--b--\r\n"))
+    assert (job["state"], job["result"]) == ("done", "t")
+    monkeypatch.setattr(recording_routes, "_ROOM", 1 << 60)
+    full = send_form(head + b"x\r\n--b--\r\n")
+    assert full.status_code == 507, full.text
+    assert "free some room" in full.text
+    assert [path.name for path in workspace.recordings.iterdir()] == ["t"]
+
+
+@pytest.mark.slow
+def test_files_of_this_machine_are_kept_without_being_sent(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    file = tmp_path / "crossing.csv"
+    crossing_traffic().write_csv(file)
+    command = ["recording", "add", str(file), "--json", "--workspace", str(workspace.root)]
+    said = CliRunner().invoke(command_line(), command)
+    assert said.exit_code == 0, said.output
+    made = json.loads(said.stdout)
+    assert (made["name"], made["map"], made["road_users"]) == ("crossing", "signal_crossing", 4)
+    assert made["scenes"] == len(
+        kept_recordings.open_recording(workspace, "crossing").about["scenes"]
+    )
+    assert made["scenes"] >= 4
+    assert file.is_file()
+    lost = CliRunner().invoke(command_line(), [*command[:2], str(tmp_path / "no.csv")])
+    assert isinstance(lost.exception, InputError)
+    assert "there is no such file" in str(lost.exception)

@@ -7,10 +7,11 @@ files; a scenario of a part is made of these.
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import count
 from math import degrees
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import polars as pl
 
 from odscen.app.exchange.imports import DiskFile, maps_for_import
-from odscen.app.exchange.recorded_traffic import show_recording
+from odscen.app.exchange.recorded_traffic import draw_tracks_on_map
 from odscen.app.maps import load_map
 from odscen.base.atomic_folders import discard, new_folder
 from odscen.base.checksums import (
@@ -37,11 +38,23 @@ from odscen.base.folder_locks import locked
 from odscen.base.shown import printable, some_of
 from odscen.base.system_errors import disk_errors
 from odscen.formats.base import VERDICTS, ElementReport, ImportMap
-from odscen.formats.tracks.lane_places import estimate_offset, share_on_lanes
-from odscen.formats.tracks.moments import MOMENT_FILES, Moments, read_moments, write_moments
-from odscen.formats.tracks.read_recording import choose_recording, map_offset, read_recording
-from odscen.formats.tracks.recorded_traffic import RecordedTraffic, shift_tracks
+from odscen.formats.tracks.lane_places import (
+    LaneFit,
+    estimate_offset,
+    moving_vehicles,
+    share_on_lanes,
+)
+from odscen.formats.tracks.moments import (
+    MOMENT_FILES,
+    ROWS_FILE,
+    Moments,
+    read_moments,
+    write_moments,
+)
+from odscen.formats.tracks.read_recording import choose_recording, map_offset, read_recording_parts
+from odscen.formats.tracks.recorded_traffic import RecordedTraffic, join_parts, shift_tracks
 from odscen.formats.tracks.scenario_of_tracks import SceneChoice, scenario_of_tracks
+from odscen.formats.tracks.scenes import exposure, find_scenes
 from odscen.maps.allowances import for_recording
 from odscen.maps.child_process import work_in_child
 from odscen.maps.folder_names import check_name, is_name, name_from_file
@@ -50,14 +63,15 @@ from odscen.maps.store import Workspace
 from odscen.opendrive.parse import parse
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from odscen.app.exchange.imports import AddedMaps
     from odscen.maps.map_entry import MapEntry
     from odscen.maps.store import ProgressCallback
     from odscen.scenario.document.scenario_document import Scenario
 
-_ABOUT, _TRACKS, _PLACED = "about.json", "tracks.parquet", "placed.parquet"
+_ABOUT, _TRACKS, _PLACED = "about.json", "tracks", "placed"
+"""What is known of it; and tracks, of which large recordings have several files."""
 _PICTURE: Final = "agreement.svg"
 _FILES: Final = "files"
 _MOST_FILES: Final = 40
@@ -65,7 +79,13 @@ MOST_USERS: Final = 50_000
 """Road users of a recording that is kept; those of highD have 3,000 at most."""
 MOST_SCENES: Final = 10_000
 """Scenes that are kept of it, the first ones; how many there are is said of all."""
-_MAP_ENDINGS: Final = (".xodr", ".osm", ".osm.gz", ".osm.bz2", ".pbf")
+SEARCHED_AT_ONCE: Final = 16_000_000
+"""Bytes of files of which scenes are looked for before they are shown."""
+_SAMPLE: Final = 100_000
+"""States of moving vehicles by which the map of a recording, and its offset, are found."""
+_MOST_DRAWN: Final = 1_000_000
+"""States that a picture of the agreement is drawn of, at most."""
+_MAP_ENDINGS: Final = (".xodr", ".json", ".osm", ".osm.gz", ".osm.bz2", ".pbf")
 _ON_MAP: Final = 0.8
 """Share of the states of moving vehicles on lanes from which on a map of the workspace is taken to
 be that of a recording."""
@@ -113,7 +133,8 @@ class KeptRecording:
     about
         As plain values: ``file``, ``schema``, ``summary``, ``map``, ``offset``, ``agreement``,
         ``exposure``, ``users``, ``scenes``, ``origin``, ``added`` (maps that came with it) and
-        ``unused`` (files that were sent and not needed).
+        ``unused`` (files that were sent and not needed). Of one that has not been searched yet
+        ``agreement`` and ``exposure`` are null.
     """
 
     name: str
@@ -127,9 +148,19 @@ class KeptRecording:
                 self.checked(file)
             return read_moments(self.folder, begin, end, most=most)
 
+    @property
+    def is_searched(self) -> bool:
+        """Whether it has been laid on the lanes of its map, and scenes have been looked for."""
+        return self.about["exposure"] is not None
+
+    def tracks(self) -> list[pl.LazyFrame]:
+        """Its tracks, in the frame of its map, each part with all of its road users."""
+        files = _part_files(self.folder, _PLACED) or _part_files(self.folder, _TRACKS)
+        return [pl.scan_parquet(self.checked(file.name)) for file in files]
+
     def picture(self) -> bytes:
         """Map and tracks, as SVG; :class:`NotFoundError` without a map."""
-        if self.about["map"] is None:
+        if self.about["map"] is None or not self.is_searched:
             raise NotFoundError("drawing of recording", self.name, [])
         return self.checked(_PICTURE).read_bytes()
 
@@ -151,7 +182,16 @@ class KeptRecording:
         return path
 
 
-@lru_cache(maxsize=256)
+def _part_files(folder: Path, stem: str) -> list[Path]:
+    return sorted(folder.glob(f"{stem}*.parquet"), key=lambda file: (len(file.name), file.name))
+
+
+def _part_file(folder: Path, stem: str, number: int) -> Path:
+    """The first one is called as it was when there was one only."""
+    return folder / (f"{stem}-{number:03}.parquet" if number else f"{stem}.parquet")
+
+
+@lru_cache(maxsize=1024)
 def _check_once(folder: Path, file: str, *_stamp: int) -> None:
     """Compare a file with its checksum unless it is known to be that file: it may be large."""
     check_files(folder, only=(file,))
@@ -215,6 +255,7 @@ def add_recording(
     files: Sequence[SentPath],
     *,
     on_map: str | None = None,
+    search: bool = True,
     progress: ProgressCallback,
 ) -> KeptRecording:
     """Keep a recording, with its map.
@@ -227,6 +268,9 @@ def add_recording(
     ----------
     files
         Those of the recording, and perhaps its map.
+    search
+        Whether its agreement with the map and its scenes are found before it is there; else
+        :func:`search_recording` does that later.
 
     Raises
     ------
@@ -250,51 +294,64 @@ def add_recording(
     with _new_recording(workspace, stem) as (name, folder), maps_for_import() as added:
         (folder / _FILES).mkdir()
         for sent in tracks:
-            shutil.copyfile(sent.path, folder / _FILES / sent.name)
+            _link_or_copy(sent.path, folder / _FILES / sent.name)
         size = sum(sent.path.stat().st_size for sent in tracks)
         read = _read_in_child(
             "read_sent_recording",
             folder,
             size,
-            lambda step, share: progress(step, 0.3 * share),
+            lambda step, share: progress(step, 0.6 * share),
             names=[sent.name for sent in tracks],
+            find_in=str(workspace.root) if on_map is None and not maps else None,
         )
         main = next(sent for sent in tracks if sent.name == read["file"])
         if read["map_within"]:
             maps = [*maps, main]
-        chosen = on_map
+        chosen = on_map or read["map"]
         if chosen is None and maps:
             if len(maps) > 1:
                 listed = ", ".join(sent.name for sent in maps)
                 raise InputError(f"several maps were sent: {listed}; send one")
             entry = _add_sent_map(
                 workspace, maps[0], read["schema"], added,
-                lambda step, share: progress(step, 0.3 + 0.4 * share),
+                lambda step, share: progress(step, 0.6 + 0.1 * share),
             )  # fmt: skip
             chosen = entry.name
-        progress("placing the recording on a map", 0.7)
-        _read_in_child(
-            "place_kept_recording",
-            folder,
-            size,
-            lambda step, share: progress(step, 0.7 + 0.3 * share),
-            workspace=str(workspace.root),
-            map_name=chosen,
-            find=chosen is None,
-            offset="",
-            estimate=False,
-            added=[entry.name for entry in added],
-        )
         shutil.rmtree(folder / _FILES)
+        about = json.loads((folder / _ABOUT).read_text(encoding="utf-8"))
+        sha256 = None if chosen is None else workspace.stored(chosen).sha256
+        about |= {"map": chosen, "map_sha256": sha256, "added": [entry.name for entry in added]}
+        (folder / _ABOUT).write_text(json.dumps(about), encoding="utf-8")
+        if search:
+            _place_in_child(workspace, folder, size, lambda w, s: progress(w, 0.7 + 0.3 * s))
         write_sums(folder, sums_of(folder), hidden=True)
     return open_recording(workspace, name)
+
+
+def _link_or_copy(file: Path, to: Path) -> None:
+    """Have a file, which may be large, in another folder too; it is only read there."""
+    try:
+        os.link(file.resolve(), to)
+    except OSError:  # it lies on another disk, or this one has no links
+        shutil.copyfile(file, to)
+
+
+def search_recording(
+    workspace: Workspace, name: str, *, progress: ProgressCallback
+) -> KeptRecording:
+    """Lay a recording on the lanes of the map that it has, and look for its scenes."""
+    kept = open_recording(workspace, name)
+    offset = ",".join(map(str, kept.about["offset"]))
+    return place_recording(
+        workspace, name, on_map=kept.about["map"], offset=offset, progress=progress
+    )
 
 
 def place_recording(
     workspace: Workspace,
     name: str,
     *,
-    on_map: str,
+    on_map: str | None,
     offset: str = "",
     estimate: bool = False,
     progress: ProgressCallback,
@@ -316,29 +373,27 @@ def place_recording(
         If there is no such map.
     """
     kept = open_recording(workspace, name)
-    map_offset(offset)
-    workspace.stored(on_map)
+    is_moved = list(map_offset(offset)) != list(
+        map_offset(",".join(map(str, kept.about["offset"])))
+    )
+    if on_map is not None:
+        workspace.stored(on_map)
     progress("placing the recording on a map", 0.0)
-    size = kept.checked(_TRACKS).stat().st_size
+    tracks = [kept.checked(file.name) for file in _part_files(kept.folder, _TRACKS)]
+    size = sum(file.stat().st_size for file in tracks)
     with (
         disk_errors(f"recording {name!r}"),
         locked(kept.folder, what=f"recording {name!r}", patience=_PATIENCE),
         new_folder(kept.folder) as folder,
     ):
-        for file in (_ABOUT, _TRACKS):
-            shutil.copyfile(kept.checked(file), folder / file)
-        _read_in_child(
-            "place_kept_recording",
-            folder,
-            4 * size,  # it is packed
-            progress,
-            workspace=str(workspace.root),
-            map_name=on_map,
-            find=False,
-            offset=offset,
-            estimate=estimate,
-            added=[],
-        )
+        shutil.copyfile(kept.checked(_ABOUT), folder / _ABOUT)
+        same = [] if is_moved or estimate else [kept.checked(file) for file in MOMENT_FILES]
+        for file in (*tracks, *same):
+            _link_or_copy(file, folder / file.name)
+        _place_in_child(
+            workspace, folder, 4 * size, progress,  # it is packed
+            map_name=on_map, offset=offset, estimate=estimate,
+        )  # fmt: skip
         write_sums(folder, sums_of(folder), hidden=True)
     return open_recording(workspace, name)
 
@@ -357,7 +412,16 @@ def fitting_maps_of(workspace: Workspace, name: str) -> list[FittingMap]:
     """The same for one that is kept, where it is placed now."""
     kept = open_recording(workspace, name)
     with disk_errors(f"recording {name!r}"):
-        return fitting_maps(workspace, pl.read_parquet(kept.checked(_PLACED)))
+        return fitting_maps(workspace, _sample_of(kept.tracks()))
+
+
+def _sample_of(parts: Sequence[pl.LazyFrame]) -> pl.DataFrame:
+    """States of moving vehicles, evenly out of all if there are many."""
+    columns = ("x", "y", "hdg", "speed", "category")
+    rows = [moving_vehicles(part.select(columns)) for part in parts]
+    count = sum(part.select(pl.len()).collect().item() for part in rows)
+    every = max(1, count // _SAMPLE)
+    return pl.concat([part.gather_every(every).collect() for part in rows])
 
 
 def scenario_of_recording(
@@ -381,9 +445,9 @@ def scenario_of_recording(
         raise InputError(f"the window from {begin:g} to {end:g} s is empty")
     with disk_errors(f"recording {name!r}"):
         rows = (
-            pl.scan_parquet(kept.checked(_PLACED))
+            pl.concat(kept.tracks())
             .filter(pl.col("time").is_between(begin - 1e-6, end + 1e-6))
-            .collect()
+            .collect(engine="streaming")
         )
     if not rows.height:
         raise InputError(f"the recording has no road user from {begin:g} to {end:g} s")
@@ -493,6 +557,29 @@ def _read_in_child(
     )
 
 
+def _place_in_child(
+    workspace: Workspace,
+    folder: Path,
+    size: int,
+    progress: ProgressCallback,
+    *,
+    map_name: str | None = None,
+    offset: str = "",
+    estimate: bool = False,
+) -> None:
+    """Place a recording; without a name and an offset on the map that it has."""
+    _read_in_child(
+        "place_kept_recording",
+        folder,
+        size,
+        progress,
+        workspace=str(workspace.root),
+        map_name=map_name,
+        offset=offset,
+        estimate=estimate,
+    )
+
+
 def _add_sent_map(
     workspace: Workspace,
     sent: SentPath,
@@ -531,36 +618,74 @@ def _add_sent_map(
 
 
 def read_sent_recording(
-    *, folder: str, names: Sequence[str], progress: Callable[[str, float], None]
+    *,
+    folder: str,
+    names: Sequence[str],
+    find_in: str | None,
+    progress: Callable[[str, float], None],
 ) -> dict[str, Any]:
-    """Read the files, and write their tracks and what is known of them; a job of a child.
+    """Read the files, and write their tracks, also by time, and what is known of them.
+
+    A job of a child.
+
+    Parameters
+    ----------
+    find_in
+        A workspace among whose maps the one is looked for on whose lanes its vehicles are.
 
     Returns
     -------
     dict
-        ``file``, ``schema``, and ``map_within``: whether the file has a map, too.
+        ``file``, ``schema``, ``map``, and ``map_within``: whether the file has a map, too.
     """
     progress("reading the recording", 0.0)
     place = Path(folder)
     files = [DiskFile(place / _FILES / name) for name in names]
     main = files[choose_recording(files)]
-    recorded = read_recording(main)
-    users = recorded.rows["id"].n_unique()
-    if users > MOST_USERS:
-        raise LimitError(
-            f"{main.name}: {users:,} road users are more than {MOST_USERS:,}; send a part of it"
-        )
-    recorded.rows.write_parquet(place / _TRACKS)
+    read: list[RecordedTraffic] = []
+    users = 0
+    for part in read_recording_parts(main):
+        users += part.rows["id"].n_unique()
+        if users > MOST_USERS:
+            raise LimitError(
+                f"{main.name}: it has more than {MOST_USERS:,} road users; send a part of it"
+            )
+        part.rows.write_parquet(_part_file(place, _TRACKS, len(read)), compression="lz4")
+        read.append(replace(part, rows=part.rows.clear()))
+        progress("reading the recording", 0.4)
+    recorded = join_parts(read, read[0].rows)
+    parts = [pl.scan_parquet(file) for file in _part_files(place, _TRACKS)]
+    summary: dict[str, Any] = recorded.summary(parts)
+    progress("writing it by time", 0.5)
+    listed, origin = write_moments(parts, place)
+    found = None
+    within = main.name.lower().endswith(".xml")
+    if find_in is not None and not within:
+        progress("looking for its map", 0.9)
+        fits = fitting_maps(Workspace.open(Path(find_in)), _sample_of(parts))
+        found = fits[0].map if fits and fits[0].on_lane >= _ON_MAP else None
     needed = {main.name, *recorded_beside(main.name, names)}
     about = {
         "file": main.name,
         "schema": recorded.schema,
-        "summary": recorded.summary(),
+        "summary": summary,
         "unused": sorted(set(names) - needed),
+        "offset": [0.0, 0.0, 0.0],
+        "agreement": None,
+        "exposure": None,
+        "users": listed,
+        "origin": origin,
+        "bounds": _bounds_of(summary),
+        "scenes": [],
     }
     (place / _ABOUT).write_text(json.dumps(about), encoding="utf-8")
-    within = main.name.lower().endswith(".xml")
-    return {"file": main.name, "schema": recorded.schema, "map_within": within}
+    return {
+        "file": main.name, "schema": recorded.schema, "map": found, "map_within": within,
+    }  # fmt: skip
+
+
+def _bounds_of(summary: Mapping[str, Any]) -> list[float]:
+    return [round(summary[axis][end], 3) for end in (0, 1) for axis in ("x", "y")]
 
 
 def recorded_beside(main: str, names: Sequence[str]) -> list[str]:
@@ -584,54 +709,67 @@ def place_kept_recording(
     folder: str,
     workspace: str,
     map_name: str | None,
-    find: bool,
     offset: str,
     estimate: bool,
-    added: Sequence[str],
     progress: Callable[[str, float], None],
 ) -> dict[str, Any]:
-    """Place tracks on a map, find their scenes, and write them by time; a job of a child."""
+    """Place tracks on a map, and find their scenes; a job of a child."""
     progress("placing the recording on a map", 0.0)
     place, store = Path(folder), Workspace.open(Path(workspace))
     about = json.loads((place / _ABOUT).read_text(encoding="utf-8"))
-    rows = pl.read_parquet(place / _TRACKS)
-    if find:
-        progress("looking for its map", 0.1)
-        fits = fitting_maps(store, rows)
-        map_name = fits[0].map if fits and fits[0].on_lane >= _ON_MAP else None
+    map_name = map_name or about["map"]
     entry = None if map_name is None else store.map(map_name)
+    files = _part_files(place, _TRACKS)
     x, y, turn = map_offset(offset)
-    rows = rows if (x, y, turn) == (0.0, 0.0, 0.0) else shift_tracks(rows, x, y, turn)
     if estimate and entry is not None:
-        dx, dy, more = estimate_offset(rows, entry.graph())
-        rows = shift_tracks(rows, dx, dy, more)
-        moved = shift_tracks(pl.DataFrame({"x": [x], "y": [y], "hdg": [turn]}), dx, dy, more)
+        rows = shift_tracks(_sample_of([pl.scan_parquet(file) for file in files]), x, y, turn)
+        by = estimate_offset(rows, entry.graph())
+        moved = shift_tracks(pl.DataFrame({"x": [x], "y": [y], "hdg": [turn]}), *by)
         x, y, turn = (float(moved[name][0]) for name in ("x", "y", "hdg"))
-    progress("looking for scenes", 0.3)
-    picture = None if entry is None else place / _PICTURE
-    recorded = RecordedTraffic(rows, about["schema"], about["summary"]["step"])
-    shown = show_recording(recorded, entry, picture=picture)
-    progress("writing it by time", 0.8)
-    shown.rows.write_parquet(place / _PLACED)
-    users, origin = write_moments(shown.rows, place)
-    if shown.scenes.height > MOST_SCENES:
-        more = shown.scenes.height - MOST_SCENES
-        about["summary"]["notes"].append(f"and {more:,} more scenes, which are not listed")
+    parts = [pl.scan_parquet(file) for file in files]
+    fit = None if entry is None else LaneFit(entry.graph())
+    if fit is not None or (x, y, turn) != (0.0, 0.0, 0.0):
+        for number, part in enumerate(parts):
+            rows = part.collect()
+            if (x, y, turn) != (0.0, 0.0, 0.0):
+                rows = shift_tracks(rows, x, y, turn)
+            placed = rows if fit is None else fit.place(rows)
+            placed.write_parquet(_part_file(place, _PLACED, number), compression="lz4")
+            progress("placing the recording on a map", 0.3 * (number + 1) / len(parts))
+        parts = [pl.scan_parquet(file) for file in _part_files(place, _PLACED)]
+    if not (place / ROWS_FILE).is_file():
+        progress("writing it by time", 0.3)
+        about["users"], about["origin"] = write_moments(parts, place)
+    progress("looking for scenes", 0.4)
+    graph = None if entry is None else entry.graph()
+    found = find_scenes(
+        parts, graph, progress=lambda share: progress("looking for scenes", 0.4 + 0.5 * share)
+    )
+    if entry is not None:
+        progress("drawing it on the map", 0.9)
+        draw_tracks_on_map(entry, _drawn_of(parts), place / _PICTURE)
+    notes = [note for note in about["summary"]["notes"] if not note.startswith("and ")]
+    if found.height > MOST_SCENES:
+        more = found.height - MOST_SCENES
+        notes.append(f"and {more:,} more scenes, which are not listed")
+    about["summary"]["notes"] = notes
+    recorded = RecordedTraffic(pl.DataFrame(), about["schema"], about["summary"]["step"])
     about |= {
         "map": None if entry is None else entry.name,
         "map_sha256": None if entry is None else entry.sha256,
-        "added": list(added) or about.get("added", []),
         "offset": [round(x, 3), round(y, 3), round(degrees(turn), 4)],
-        "agreement": shown.summary.get("agreement"),
-        "exposure": shown.summary["exposure"],
-        "users": users,
-        "origin": origin,
-        "bounds": [
-            round(getattr(shown.rows[axis], least)(), 3)
-            for least in ("min", "max")
-            for axis in ("x", "y")
-        ],
-        "scenes": shown.scenes.head(MOST_SCENES).to_dicts(),
+        "agreement": None if fit is None else fit.agreement(),
+        "exposure": exposure(parts, found),
+        "bounds": _bounds_of(recorded.summary(parts)),
+        "scenes": found.head(MOST_SCENES).to_dicts(),
     }
     (place / _ABOUT).write_text(json.dumps(about), encoding="utf-8")
     return {}
+
+
+def _drawn_of(placed: Sequence[pl.LazyFrame]) -> pl.DataFrame:
+    """What is drawn of tracks: of many states so many of each road user, evenly."""
+    count = sum(part.select(pl.len()).collect().item() for part in placed)
+    every = max(1, -(-count // _MOST_DRAWN))
+    columns = ("id", "category", "x", "y", "on_lane", "wrong_way")
+    return pl.concat([part.select(columns).gather_every(every).collect() for part in placed])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from odscen.app.exchange.imports import DiskFile
+from odscen.app.maps import load_map
 from odscen.base.errors import InputError
 from odscen.base.given_files import as_path
 from odscen.formats.tracks.lane_places import estimate_offset, fit_on_map
@@ -86,41 +87,90 @@ def show_recording(
     scenes = find_scenes(rows, graph)
     summary["exposure"] = exposure(rows, scenes)
     if picture is not None:
-        tracks: dict[str, list[Any]] = {}
-        for (kind, _), own in rows.group_by("category", "id", maintain_order=True):
-            tracks.setdefault(str(kind), []).append(own.select("x", "y").to_numpy())
-        driven = rows.filter(pl.col("category") != "pedestrian")
-        places = {
-            name: driven.filter(where).select("x", "y").to_numpy()
-            for name, where in (
-                ("On no lane", ~pl.col("on_lane")),
-                ("Against its lane", pl.col("wrong_way")),
-            )
-        }
-        draw_lines_on_map(entry, tracks, places, picture)
+        draw_tracks_on_map(entry, rows, picture)
     return ShownRecording(summary, rows, scenes)
 
 
-def fit_recorded_drivers(recorded: RecordedTraffic, entry: MapEntry | None = None) -> FittedDrivers:
+def draw_tracks_on_map(entry: MapEntry, placed: pl.DataFrame, picture: Path) -> None:
+    """Draw tracks on their map, with circles where vehicles are on no lane or against theirs."""
+    tracks: dict[str, list[Any]] = {}
+    for (kind, _), own in placed.group_by("category", "id", maintain_order=True):
+        tracks.setdefault(str(kind), []).append(own.select("x", "y").to_numpy())
+    driven = placed.filter(pl.col("category") != "pedestrian")
+    places = {
+        name: driven.filter(where).select("x", "y").to_numpy()
+        for name, where in (
+            ("On no lane", ~pl.col("on_lane")),
+            ("Against its lane", pl.col("wrong_way")),
+        )
+    }
+    draw_lines_on_map(entry, tracks, places, picture)
+
+
+def fit_recorded_drivers(
+    recorded: RecordedTraffic, entry: MapEntry | None = None, *, model: str | None = None
+) -> FittedDrivers:
     """Driver sets that drive as those of recorded traffic do.
 
     Parameters
     ----------
     entry
         The map in whose frame its places are, whose limits desired speeds are shares of; without
-        one they are not fitted.
+        one these are not fitted, and curves, gaps, changes of lanes and pedestrians not measured.
+    model
+        ``IDM`` or ``Krauss``; that which is nearer to the tracks if not given.
+
+    Returns
+    -------
+    FittedDrivers
+        With a map its report has ``habits``
+        (:func:`~odscen.formats.tracks.road_user_habits.measure_habits`).
 
     Raises
     ------
     InputError
-        If nobody follows another vehicle for 10 s.
+        If nobody follows another vehicle for 10 s, or there is no such model.
     """
     from odscen.formats.tracks.driver_fit import fit_drivers
+    from odscen.formats.tracks.road_user_habits import measure_habits
 
     if entry is None:
-        return fit_drivers(recorded.rows)
+        return fit_drivers(recorded.rows, model=model)
     graph = entry.graph()
-    return fit_drivers(fit_on_map(recorded.rows, graph)[0], graph=graph)
+    placed = fit_on_map(recorded.rows, graph)[0]
+    fitted = fit_drivers(placed, graph=graph, model=model)
+    lit = {name for light in load_map(entry).lights for name in light.names}
+    return fitted._replace(
+        report={**fitted.report, "habits": measure_habits(placed, graph, lit=lit)}
+    )
+
+
+def compare_with_recording(
+    run: RecordedTraffic, recorded: RecordedTraffic, entry: MapEntry | None = None
+) -> dict[str, Any]:
+    """How far the distributions of a run are from those of recorded traffic.
+
+    Parameters
+    ----------
+    run
+        Tracks of a run; :func:`read_recorded_traffic` reads its folder.
+    entry
+        The map on which both lie; without one figures of the map are left out, and all of the run
+        is compared.
+
+    Returns
+    -------
+    dict
+        As of :func:`~odscen.formats.tracks.realism.compare_traffic`.
+
+    Raises
+    ------
+    InputError
+        If one of them has no road user, or the run has none where it was recorded.
+    """
+    from odscen.formats.tracks.realism import compare_traffic
+
+    return compare_traffic(run.rows, recorded.rows, None if entry is None else entry.graph())
 
 
 def read_recorded_traffic(
@@ -129,7 +179,8 @@ def read_recorded_traffic(
     """Tracks of recorded traffic, whatever the schema of its file is.
 
     Read are INTERACTION, SinD, levelX (highD, inD, rounD, exiD), NGSIM and Argoverse 2, OSI traces
-    (``.osi``, MCAP) and omega-prime, CommonRoad, other tables, and runs of odscen.
+    (``.osi``, MCAP) and omega-prime, CommonRoad, scenarios of ScenarioNet (nuScenes, Waymo), other
+    tables, and runs of odscen.
 
     Parameters
     ----------

@@ -28,23 +28,23 @@ if TYPE_CHECKING:
 
 def scenes_of(workspace: Workspace, shards: Sequence[Shard]) -> list[TrafficScene]:
     """Vehicles of snapshots that a generator might have placed; empty snapshots are left out."""
-    found = []
+    scenes = []
     for shard in shards:
         for example in examples_of(workspace, [shard]):
-            good, one = placed(example), example.snapshot
+            good, snapshot = placed(example), example.snapshot
             if good.any():
-                found.append(
+                scenes.append(
                     TrafficScene(
-                        one.node[good],
-                        one.category[good],
-                        one.speed[good],
-                        one.lights,
+                        snapshot.node[good],
+                        snapshot.category[good],
+                        snapshot.speed[good],
+                        snapshot.lights,
                         str(shard.about.get("seed")),
                     )
                 )
-    if not found:
+    if not scenes:
         raise InputError(f"the snapshots of {shards[0].map_name} have no vehicles to compare with")
-    return found
+    return scenes
 
 
 def placed_at_random(on: WholeMap, request: FillRequest, rng: np.random.Generator) -> Fill:
@@ -61,9 +61,9 @@ def scene_of_actors(
     names = [*Category]
     places = [place_of(on.region.graph, actor.spawn) for actor in actors]
     kept = [
-        (place.node, names.index(one.category), one.initial_speed or 0.0)
-        for place, one in zip(places, actors, strict=True)
-        if place is not None and not place.walk and one.depart == 0.0
+        (place.node, names.index(actor.category), actor.initial_speed or 0.0)
+        for place, actor in zip(places, actors, strict=True)
+        if place is not None and not place.walk and actor.depart == 0.0
     ]
     node, category, speed = zip(*kept, strict=True) if kept else ((), (), ())
     return TrafficScene(

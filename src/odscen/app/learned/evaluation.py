@@ -91,10 +91,10 @@ def first_seconds(workspace: Workspace, scenarios: Sequence[Scenario]) -> list[F
             recording=Recording(emissions=False),
         )
         checked = [
-            check_run(workspace, one, name=f"{place:03d}", out=folder, settings=settings)
-            for place, one in enumerate(scenarios)
+            check_run(workspace, scenario, name=f"{place:03d}", out=folder, settings=settings)
+            for place, scenario in enumerate(scenarios)
         ]
-        found = []
+        seconds = []
         for run in run_all(checked, reports=False, figures=False):
             if run.exit_code == 3:
                 raise InputError(
@@ -105,14 +105,14 @@ def first_seconds(workspace: Workspace, scenarios: Sequence[Scenario]) -> list[F
             first = rows.filter(rows["time"] < STEP / 2.0)["id"].to_list()
             planned = max(run.counts["planned"], 1)
             braking = braking_of(rows, 0.0, first)
-            found.append(
+            seconds.append(
                 FirstSeconds(
                     braking[~np.isnan(braking)],
                     run.counts["collided"] / planned,
                     run.counts["inserted"] / planned,
                 )
             )
-    return found
+    return seconds
 
 
 # ----------------------- how good generated traffic is, map by map, beside baselines and SUMO's own
@@ -162,7 +162,9 @@ class TrafficQuality:
         """As values that JSON can hold, ``None`` for those that are not known."""
         values = {
             name: {part: None if math.isnan(number) else number for part, number in pairs}
-            for name, pairs in ((name, one._asdict().items()) for name, one in self.values.items())
+            for name, pairs in (
+                (name, value._asdict().items()) for name, value in self.values.items()
+            )
         }
         return {**asdict(self), "values": values}
 
@@ -215,29 +217,29 @@ def evaluate_model(
         assert statistics is not None
         lengths = np.array([request.bodies[category].length for category in VEHICLES])
         site, allowed = on.learned.site, on.learned.allowed
-        found = place_binned(
+        placed = place_binned(
             statistics, site, request.lights, allowed,
             wanted=request.vehicles, lengths=lengths, rng=rng,
         )  # fmt: skip
-        return Fill(found.node, names_of(found.category), initial_speed=found.speed)
+        return Fill(placed.node, names_of(placed.category), initial_speed=placed.speed)
 
     sources = {REFERENCE: by_reference, BINNED: by_bins, RANDOM: placed_at_random}
     if statistics is None:
         del sources[BINNED]
     if not baselines:
         del sources[RANDOM]
-    found = []
+    qualities = []
     for name in sorted({shard.map_name for shard in shards}):
         mine = [shard for shard in shards if shard.map_name == name]
         on = whole_map(workspace.map_for(name, mine[0].map_sha256))
         compared = _ComparedMap(on, scenes_of(workspace, mine), workspace, draws)
-        found.append(compared.floor(mine))
+        qualities.append(compared.floor(mine))
         for source, place in sources.items():
             if told is not None:
                 told(f"{name}: {source}")
             made = compared.filled(place, seed, most)
-            found.append(compared.quality(source, made, run=run))
-    return found
+            qualities.append(compared.quality(source, made, run=run))
+    return qualities
 
 
 def evaluate_scenarios(
@@ -253,7 +255,7 @@ def evaluate_scenarios(
         If there are no scenarios, or no snapshots of the map of one.
     """
     scenarios = [read_scenario(file) for file in scenario_files([folder])]
-    found = []
+    qualities = []
     for name in sorted({scenario.map.name for scenario in scenarios}):
         mine = [shard for shard in shards if shard.map_name == name]
         if not mine:
@@ -271,8 +273,8 @@ def evaluate_scenarios(
             *(scene_of_scenario(on, *pair) for pair in zip(own, lights, strict=True)), strict=True
         )
         made = _MadeTraffic(list(scenes), float(np.mean(off)), own)
-        found += [compared.floor(mine), compared.quality(folder.name, made, run=run)]
-    return found
+        qualities += [compared.floor(mine), compared.quality(folder.name, made, run=run)]
+    return qualities
 
 
 class _MadeTraffic(NamedTuple):
@@ -300,7 +302,7 @@ class _ComparedMap:
     def floor(self, shards: Sequence[Shard]) -> TrafficQuality:
         """SUMO's own traffic: runs of even numbers compared with those of odd ones."""
         runs = list(dict.fromkeys(scene.name for scene in self._scenes))
-        even = [place for place, one in enumerate(self._scenes) if runs.index(one.name) % 2]
+        even = [place for place, scene in enumerate(self._scenes) if runs.index(scene.name) % 2]
         odd = [place for place in range(len(self._scenes)) if place not in even]
         values: dict[str, MeasuredValue] = {}
         if even:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from odscen.app.learned.recorded_data import RECORDER, record_replays
 from odscen.app.learned.snapshot_data import town_of, traffic_scenario
 from odscen.app.maps import load_map
 from odscen.app.running.batches import run_all
@@ -24,14 +25,14 @@ from odscen.runs.run_settings import RunSettings
 from odscen.scenario.document.distributions import stream
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
     from odscen.base.given_files import GivenPath
+    from odscen.formats.tracks.recorded_traffic import RecordedTraffic
     from odscen.learning.fill import Array
     from odscen.maps.store import Workspace
 
-RECORDER = "odscen.learning.behaviour.imitation_driver:DrivingRecorder"
 _DENSITY = (4.0, 14.0)
 """Vehicles per kilometre of lane."""
 
@@ -57,9 +58,10 @@ def learn_driving(
     runs: int = 3,
     duration: float = 200.0,
     seed: int = 0,
+    recordings: Mapping[str, RecordedTraffic] | None = None,
     told: Callable[[str], None] | None = None,
 ) -> tuple[DrivingError, ...]:
-    """Record SUMO's drivers on maps, learn from them, and write the weights.
+    """Record SUMO's drivers on maps, or those of recordings, learn from them, write the weights.
 
     Parameters
     ----------
@@ -71,33 +73,63 @@ def learn_driving(
         Towns that are only recorded to measure the error on; without any it is that of training.
     runs, duration
         Of each map, and seconds of each.
+    recordings
+        By name, in place of runs; all lie on the one map that is named. The first 70 % of the time
+        of each are learned from, and the error is that on the rest.
 
     Raises
     ------
     InputError
-        If nothing is left to learn from.
+        If recordings lie on several maps, or nothing is left to learn from.
     SimulationError
         If a run fails.
     """
+    if recordings:
+        if len(maps) != 1:
+            raise InputError(f"recordings lie on one map, not on {len(maps)}", element="map")
+        replays = {
+            name: record_replays(workspace, maps[0], tracks, name=name)
+            for name, tracks in recordings.items()
+        }
+        if told is not None:
+            for name, parts in replays.items():
+                told(f"{name}: {sum(len(x) for part in parts for x, _ in part):,} seen")
+        learned = [arrays for first, _ in replays.values() for arrays in first]
+        rest = {name: rest for name, (_, rest) in replays.items()}
+        about: dict[str, Any] = {"recordings": sorted(recordings), "maps": list(maps)}
+        return _learn_and_measure(learned, rest, out, about, seed)
     recorded = {}
     for name in maps:
         recorded[name] = [_record_driving(workspace, name, seed + k, duration) for k in range(runs)]
         if told is not None:
             told(f"{name}: {sum(len(x) for x, _ in recorded[name]):,} seen")
     kept = [name for name in maps if town_of(name) not in hold_out]
-    rows = [arrays for name in kept for arrays in recorded[name] if len(arrays[0])]
+    rows = [arrays for name in kept for arrays in recorded[name]]
+    measured = {name: recorded[name] for name in maps if name not in kept} or recorded
+    return _learn_and_measure(rows, measured, out, {"maps": kept, "runs": runs}, seed)
+
+
+def _learn_and_measure(
+    learned: Sequence[tuple[Array, FloatArray]],
+    measured: Mapping[str, Sequence[tuple[Array, FloatArray]]],
+    out: GivenPath,
+    about: Mapping[str, Any],
+    seed: int,
+) -> tuple[DrivingError, ...]:
+    rows = [arrays for arrays in learned if len(arrays[0])]
     if not rows:
         raise InputError(
             "nothing is left to learn from: no maps, or all are held out", element="hold-out"
         )
     x, acceleration = (np.concatenate([row[k] for row in rows]) for k in (0, 1))
     network = learned_driver(x, acceleration, np.random.default_rng(seed))
-    about = {"maps": kept, "runs": runs, "rows": len(x), "seed": seed, "odscen": __version__}
-    write_file(as_path(out), network_bytes(network, about))
-    measured = [name for name in maps if name not in kept] or kept
+    facts = {**about, "rows": len(x), "seed": seed, "odscen": __version__}
+    write_file(as_path(out), network_bytes(network, facts))
     found = []
-    for name in measured:
-        x, acceleration = (np.concatenate([arrays[k] for arrays in recorded[name]]) for k in (0, 1))
+    for name, parts in measured.items():
+        if not parts:
+            continue
+        x, acceleration = (np.concatenate([arrays[k] for arrays in parts]) for k in (0, 1))
         guess = softmax(network(x)) @ BINS
         found.append(
             DrivingError(

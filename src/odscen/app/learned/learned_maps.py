@@ -87,7 +87,7 @@ def examples_of(workspace: Workspace, shards: Iterable[Shard]) -> list[Example]:
     InputError
         If the map of that name has other content.
     """
-    found = []
+    examples = []
     for shard in shards:
         entry = workspace.map_for(shard.map_name, shard.map_sha256)
         learned = whole_map(entry).learned
@@ -97,5 +97,5 @@ def examples_of(workspace: Workspace, shards: Iterable[Shard]) -> list[Example]:
                 msg = f"a snapshot of {shard.map_name} has node {int(snapshot.node.max())}, "
                 msg += f"but the map has {nodes}: it was taken on other nodes"
                 raise InputError(msg)
-            found.append(Example(learned, snapshot))
-    return found
+            examples.append(Example(learned, snapshot))
+    return examples

@@ -45,7 +45,7 @@ from odscen.scenario.document.scenario_document import (
 from odscen.sumo.realize.signals_ahead import lights_at
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     import polars as pl
@@ -244,14 +244,14 @@ def _make_shard(
 ) -> MadeShard:
     density = float(stream(seed, "density", name).uniform(*settings.density))
     for _ in range(ATTEMPTS):
-        found = _attempt_shard(workspace, name, seed, density, file, settings)
-        if found.skipped is None:
+        shard = _attempt_shard(workspace, name, seed, density, file, settings)
+        if shard.skipped is None:
             break
         density /= 2.0
-    if found.skipped is not None:
+    if shard.skipped is not None:
         note = file.with_name(file.name.removesuffix(SUFFIX) + SKIPPED)
-        write_text(note, json.dumps({"why": found.skipped}) + "\n")
-    return found
+        write_text(note, json.dumps({"why": shard.skipped}) + "\n")
+    return shard
 
 
 def _attempt_shard(
@@ -362,11 +362,31 @@ def snapshots_of(run: Run, loaded: LoadedMap, times: Sequence[float]) -> tuple[S
     InputError
         If no trajectories were recorded.
     """
-    rows = vehicles_of(run)
     logs = light_logs(run)
+    return snapshots_of_rows(vehicles_of(run), loaded, times, logs=logs)
+
+
+def snapshots_of_rows(
+    rows: pl.DataFrame,
+    loaded: LoadedMap,
+    times: Sequence[float],
+    *,
+    logs: Mapping[str, LightLog] | None = None,
+) -> tuple[Snapshot, ...]:
+    """Take snapshots of vehicles, whoever recorded them.
+
+    Parameters
+    ----------
+    rows
+        ``id``, ``time``, ``category``, ``x``, ``y``, ``hdg`` and ``speed`` of vehicles.
+    times
+        Seconds, each of some row.
+    logs
+        What each light showed, by its SUMO id.
+    """
     tree = _build_node_tree(loaded)
     return tuple(
-        _make_snapshot(rows, time, tree, lights_at(loaded.sumo, logs, time)) for time in times
+        _make_snapshot(rows, time, tree, lights_at(loaded.sumo, logs or {}, time)) for time in times
     )
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from odscen.base.arrays import offsets, ranges
 from odscen.base.ids import LaneKey
-from odscen.formats.recordings.road_edges import road_edges
 from odscen.formats.recordings.run_recording import (
     CrosswalkElement,
     LaneElement,
@@ -86,7 +85,7 @@ def _make_lane_elements(
     lines = _sample_polylines(table, rows, table.lane_s0[rows], table.lane_s1[rows])
     entries, exits = _lane_links(graph)
     row_of = {key: row for row, key in enumerate(own.keys)}
-    found = []
+    elements = []
     for row, key in enumerate(own.keys):
         part = slice(int(lines.start[row]), int(lines.start[row + 1]))
         turned = 1 if own.forward[row] else -1
@@ -99,7 +98,7 @@ def _make_lane_elements(
         nodes = slice(int(own.first_node[row]), int(own.first_node[row + 1]))
         middle = (nodes.start + nodes.stop) // 2
         change = int(graph.lane_change[middle])
-        found.append(
+        elements.append(
             LaneElement(
                 key=str(key),
                 kind=own.types[row],
@@ -119,7 +118,7 @@ def _make_lane_elements(
                 change_right=bool(change & CHANGE_RIGHT),
             )
         )
-    return tuple(found)
+    return tuple(elements)
 
 
 def _lane_links(graph: LaneGraph) -> tuple[list[tuple[int, ...]], list[tuple[int, ...]]]:
@@ -173,9 +172,9 @@ def _make_line_elements(odr: OpenDrive, table: RoadTable) -> Iterator[LineElemen
     s0 = np.array([stretch.s0 for stretch in stretches])
     s1 = np.array([stretch.s1 for stretch in stretches])
     lines = _sample_polylines(table, rows, s0, s1)
-    for k, one in enumerate(stretches):
-        points = (lines.inner if one.inner else lines.outer)[lines.start[k] : lines.start[k + 1]]
-        yield LineElement(one.kind, one.color, points)
+    for k, mark in enumerate(stretches):
+        points = (lines.inner if mark.inner else lines.outer)[lines.start[k] : lines.start[k + 1]]
+        yield LineElement(mark.kind, mark.color, points)
 
 
 def _marked_stretches(
@@ -198,3 +197,61 @@ def _mark_intervals(
     ends = [*(mark.s for mark in marks[1:]), section.s_end]
     for mark, end in zip(marks, ends, strict=False):
         yield mark, max(mark.s, section.s), min(end, section.s_end)
+
+
+# ------------------------------------------------------------------- where the driving surface ends
+# Along a road that is each border of a lane that no other driving lane lies beyond. In a junction
+# lanes cross, so that it is the outline of all of its lanes together, open where roads lead in.
+_SEAM = 0.05
+"""Metres by which lanes of a junction may miss each other without an edge between them."""
+_OPEN = 0.3
+"""Metres around the roads at a junction within which its outline is no edge."""
+_SHORTEST_EDGE = 0.5
+
+
+def road_edges(lanes: Sequence[LaneElement]) -> Iterator[FloatArray]:
+    """Edges of the driving surface, shape ``(n, 3)`` each."""
+    for lane in lanes:
+        if not lane.junction:
+            yield from _outer_borders(lane)
+    junctions: dict[str, list[int]] = {}
+    for row, lane in enumerate(lanes):
+        if lane.junction:
+            junctions.setdefault(lane.junction, []).append(row)
+    for rows in junctions.values():
+        yield from _outline_of_lanes(rows, lanes)
+
+
+def _outer_borders(lane: LaneElement) -> Iterator[FloatArray]:
+    beyond = lane.opposite >= 0
+    if lane.left_lane < 0 and not (beyond and lane.keeps_right):
+        yield lane.left
+    if lane.right_lane < 0 and not (beyond and not lane.keeps_right):
+        yield lane.right
+
+
+def _outline_of_lanes(rows: Sequence[int], lanes: Sequence[LaneElement]) -> Iterator[FloatArray]:
+    import shapely
+    from scipy.spatial import cKDTree
+
+    inside = [lanes[row] for row in rows]
+    around = {entry for lane in inside for entry in (*lane.entries, *lane.exits)} - set(rows)
+    ground = shapely.union_all([_lane_polygon(lane).buffer(_SEAM) for lane in inside]).buffer(
+        -_SEAM
+    )
+    roads = shapely.union_all([_lane_polygon(lanes[row]) for row in sorted(around)])
+    outline = ground.boundary.difference(roads.buffer(_OPEN))
+    lines = shapely.get_parts(shapely.line_merge(outline) if outline.length else outline)
+    border = np.concatenate([np.concatenate([lane.left, lane.right]) for lane in inside])
+    tree = cKDTree(border[:, :2])
+    for line in lines:
+        if line.length >= _SHORTEST_EDGE:
+            xy = shapely.get_coordinates(line)
+            yield np.column_stack([xy, border[tree.query(xy)[1], 2]])
+
+
+def _lane_polygon(lane: LaneElement) -> Any:
+    import shapely
+
+    ring = np.concatenate([lane.left[:, :2], lane.right[::-1, :2]])
+    return shapely.Polygon(ring).buffer(0.0)

@@ -109,19 +109,21 @@ def _colors_of_link(letters: Sequence[str], link: int) -> NDArray[np.uint8]:
 
 def _light_movements(sumo_map: SumoMap, lanes: Sequence[LaneElement]) -> list[Movement]:
     """Movements over stop lines that are found on the lane graph."""
-    found = []
+    movements = []
     row_of = {lane.key: row for row, lane in enumerate(lanes)}
     for light in sumo_map.lights:
-        for link, one in enumerate(light.links):
-            source = row_of.get(sumo_map.lane_names.get(one.source, ""), -1)
-            target = row_of.get(sumo_map.lane_names.get(one.target, ""), -1)
+        for link, signal in enumerate(light.links):
+            source = row_of.get(sumo_map.lane_names.get(signal.source, ""), -1)
+            target = row_of.get(sumo_map.lane_names.get(signal.target, ""), -1)
             if source < 0 or target < 0:
                 continue
             path = _shortest_lane_path(lanes, source, target)
             inside = next((k for k, row in enumerate(path) if lanes[row].junction), None)
             if inside:
-                found.append(Movement(light.id, link, one.turn, path[inside - 1], path[inside]))
-    return found
+                movements.append(
+                    Movement(light.id, link, signal.turn, path[inside - 1], path[inside])
+                )
+    return movements
 
 
 def _shortest_lane_path(lanes: Sequence[LaneElement], source: int, target: int) -> list[int]:

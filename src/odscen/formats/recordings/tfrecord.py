@@ -72,7 +72,7 @@ def crc32c(data: bytes) -> int:
     table = _make_crc_table()
     for column in padded.reshape(rows, _ROW).T:
         register = table[(register ^ column) & 255] ^ (register >> 8)
-    moved = _moved_by_a_row()
+    moved = _make_row_shifts()
     joined = 0
     for row in register.tolist():
         joined = row ^ reduce(xor, (moved[k][joined >> 8 * k & 255] for k in range(4)))
@@ -101,7 +101,7 @@ def _make_crc_table() -> NDArray[np.uint32]:
 
 
 @lru_cache(maxsize=1)
-def _moved_by_a_row() -> list[list[int]]:
+def _make_row_shifts() -> list[list[int]]:
     """Register after a row of zeros, for each value of each of its four bytes."""
     register = np.arange(256, dtype=np.uint32)[None] << (8 * np.arange(4, dtype=np.uint32))[:, None]
     table = _make_crc_table()

@@ -125,8 +125,8 @@ def tracks_of(source: ExportSource, recorded: RecordedRun, times: FloatArray) ->
             f"{len(users)} road users at {len(times)} instants are more than {MOST_STATES:,} "
             "states; choose a part of the run with --begin and --end"
         )
-    found = [_on_grid(own[user.id], times, recorded.step) for user in users]
-    there = [k for k, one in enumerate(found) if one.valid.any()]
+    found = [_resample_to_grid(own[user.id], times, recorded.step) for user in users]
+    there = [k for k, track in enumerate(found) if track.valid.any()]
     if not there:
         raise InputError(
             f"no road users were in the simulation from {times[0]:g} to {times[-1]:g} s"
@@ -163,7 +163,7 @@ class _Track(NamedTuple):
     speed: FloatArray
 
 
-def _on_grid(rows: pl.DataFrame, times: FloatArray, step: float) -> _Track:
+def _resample_to_grid(rows: pl.DataFrame, times: FloatArray, step: float) -> _Track:
     """States of one road user; what lies between two records that belong together is linear."""
     at = rows["time"].to_numpy()
     x, y, z, hdg, speed = (

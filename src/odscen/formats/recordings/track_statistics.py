@@ -31,7 +31,9 @@ def track_statistics(recording: RunRecording) -> dict[str, Any]:
     classes = np.where(speed < STANDING, 0, np.maximum(classes, 1))
     found: dict[str, Any] = {}
     for category in sorted(set(tracks.categories)):
-        own = np.array([one == category for one in tracks.categories], dtype=np.bool_)
+        own = np.array(
+            [track_category == category for track_category in tracks.categories], dtype=np.bool_
+        )
         valid = tracks.valid[own]
         counts = np.bincount(classes[own][valid], minlength=_CLASSES)
         found[category] = {

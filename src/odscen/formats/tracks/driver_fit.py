@@ -3,16 +3,15 @@
 Each driver's parameters are those with which its model, driven behind its recorded leader, comes
 closest to its recorded gaps and speeds: calibration by whole trajectories, as in Kesting and
 Treiber, "Calibrating car-following models by using trajectory data", Transportation Research Record
-2088, 2008. The model is the intelligent driver as SUMO steps it, so that what is fitted is what
-SUMO then drives. Krauss' model, SUMO's usual one, is not fitted: its parameters were not recovered
-from runs in which they were known.
+2088, 2008. The models are the intelligent driver and Krauss' driver as SUMO steps them, so that
+what is fitted is what SUMO then drives; the latter is fitted step by step
+(:mod:`odscen.formats.tracks.krauss_model`).
 """
 
 from __future__ import annotations
 
 import math
 import zlib
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -20,8 +19,8 @@ import polars as pl
 
 from odscen.base.categories import Category
 from odscen.base.errors import InputError
-from odscen.formats.tracks.close_pairs import find_close_pairs
-from odscen.formats.tracks.scenes import known_sizes
+from odscen.formats.tracks.followings import find_followings
+from odscen.formats.tracks.krauss_model import fit_krauss_driver, next_speed_of_krauss
 from odscen.scenario.document.drivers_document import Drivers
 from odscen.scenario.document.problems import validated
 from odscen.sumo.realize.driving import HEADWAY, KINDS, STYLES
@@ -30,10 +29,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from odscen.base.arrays import FloatArray
+    from odscen.formats.tracks.followings import Following
     from odscen.lanegraph.graphs import MapGraph
 
-MODEL: Final = "IDM"
-"""SUMO's name of the model."""
+MODELS: Final = ("IDM", "Krauss")
+"""SUMO's names of the models."""
 PARAMETERS: Final = ("tau", "minGap", "accel", "decel")
 _BOUNDS: Final = {
     "tau": (0.2, 5.0),
@@ -41,13 +41,6 @@ _BOUNDS: Final = {
     "accel": (0.2, 8.0),
     "decel": (0.6, 10.0),
 }
-_SIGHT: Final = 100.0
-"""Metres within which a vehicle ahead is followed."""
-_ALIGNED: Final = math.radians(20.0)
-_STEP: Final = 0.1
-"""Seconds between states that are looked at, about."""
-_SHORTEST: Final = 5.0
-"""Seconds behind the same leader that are one following."""
 _LEAST: Final = 10.0
 """Seconds behind leaders from which on a driver is fitted."""
 _HELD_OUT: Final = 3
@@ -55,39 +48,12 @@ _HELD_OUT: Final = 3
 _FREE: Final = 6.0
 """Seconds of headway from which on a driver is free."""
 _STEADY: Final = 0.5
+_CLOSES: Final = 0.1
+"""m/s by which a leader is slower to be come nearer to."""
+_LONGEST_TTC: Final = 20.0
 _FIRST_DRIVERS, _DRIVERS, _BEST, _GENERATIONS, _WIDER = 800, 200, 40, 40, 1.5
 _FEW: Final = 4
 """Drivers below which a parameter is their median, and no distribution."""
-
-
-class Following(NamedTuple):
-    """A vehicle behind another one in its lane.
-
-    Attributes
-    ----------
-    id, leader, category
-        Of whom.
-    step
-        Seconds between states.
-    speed, gap, leader_speed
-        Shapes ``(T,)``: m/s, m from bumper to bumper, m/s.
-    travelled
-        Metres since the first state, shape ``(T,)``.
-    """
-
-    id: str
-    leader: str
-    category: str
-    step: float
-    speed: FloatArray
-    gap: FloatArray
-    leader_speed: FloatArray
-    travelled: FloatArray
-
-    @property
-    def seconds(self) -> float:
-        """How long it lasts."""
-        return (len(self.speed) - 1) * self.step
 
 
 class FittedDrivers(NamedTuple):
@@ -98,16 +64,19 @@ class FittedDrivers(NamedTuple):
     drivers
         Driver sets, one for each category, as scenarios have them.
     report
-        As plain values: ``model``, ``categories`` with parameters, their spread, correlation and
-        how many drivers were fitted and held out, and ``comparison``: figures of those held out as
-        recorded, by the fitted and by the default drivers.
+        As plain values: ``categories`` with ``model``, ``misfit`` (of each model that was fitted),
+        parameters, their spread, correlation and how many drivers were fitted and held out, and
+        ``comparison``: figures of those held out as recorded, by the fitted and by the default
+        drivers, and which of both are ``nearer``.
     """
 
     drivers: Drivers
     report: dict[str, Any]
 
 
-def fit_drivers(rows: pl.DataFrame, *, graph: MapGraph | None = None) -> FittedDrivers:
+def fit_drivers(
+    rows: pl.DataFrame, *, graph: MapGraph | None = None, model: str | None = None
+) -> FittedDrivers:
     """Fit drivers to tracks, category by category, and judge them on drivers held out.
 
     Parameters
@@ -116,12 +85,16 @@ def fit_drivers(rows: pl.DataFrame, *, graph: MapGraph | None = None) -> FittedD
         Tracks; with a map those of :func:`~odscen.formats.tracks.lane_places.fit_on_map`.
     graph
         The map, whose limits desired speeds are shares of; without one they are not fitted.
+    model
+        One of :data:`MODELS`; of each category that with the least misfit if not given.
 
     Raises
     ------
     InputError
-        If nobody follows another vehicle for 10 s.
+        If nobody follows another vehicle for 10 s, or there is no such model.
     """
+    if model is not None and model not in MODELS:
+        raise InputError(f"{model!r} is no model that is fitted; there are {', '.join(MODELS)}")
     followings = find_followings(rows)
     by_driver: dict[str, list[Following]] = {}
     for following in followings:
@@ -137,7 +110,11 @@ def fit_drivers(rows: pl.DataFrame, *, graph: MapGraph | None = None) -> FittedD
             f"no vehicle follows another one for {_LEAST:g} s; the longest does for {longest:.1f} s"
         )
     factors = {} if graph is None else _speed_factors(rows, graph)
-    fitted = {driver: fit_driver(own) for driver, own in usable.items()}
+    names = MODELS if model is None else (model,)
+    fitted_by = {
+        name: {driver: fit_driver(own, model=name) for driver, own in usable.items()}
+        for name in names
+    }
     sets, categories, comparison = [], {}, []
     for category in Category:
         own = [driver for driver in usable if usable[driver][0].category == category]
@@ -145,6 +122,11 @@ def fit_drivers(rows: pl.DataFrame, *, graph: MapGraph | None = None) -> FittedD
             continue
         held_out = _choose_held_out(own)
         trained = [driver for driver in own if driver not in held_out]
+        misfit = {
+            name: round(_mean_misfit(trained, usable, fitted_by[name], name), 4) for name in names
+        }
+        chosen = min(names, key=lambda name: (misfit[name], name))
+        fitted = fitted_by[chosen]
         values = {
             name: np.array([fitted[driver][name] for driver in trained]) for name in PARAMETERS
         }
@@ -155,11 +137,13 @@ def fit_drivers(rows: pl.DataFrame, *, graph: MapGraph | None = None) -> FittedD
         sets.append(
             {
                 "id": f"recorded-{category}",
-                "car_following": MODEL,
+                "car_following": chosen,
                 "parameters": {name: _distribution_of(each) for name, each in spread.items()},
             }
         )
         categories[str(category)] = {
+            "model": chosen,
+            "misfit": misfit,
             "fitted": len(trained),
             "held_out": len(held_out),
             "parameters": spread,
@@ -168,86 +152,36 @@ def fit_drivers(rows: pl.DataFrame, *, graph: MapGraph | None = None) -> FittedD
         judged = [following for driver in held_out for following in usable[driver]]
         if judged:
             typical = {name: spread[name]["median"] for name in PARAMETERS}
-            comparison += _compare_drivers(category, judged, typical)
+            comparison += _compare_drivers(category, judged, typical, chosen)
     drivers = validated(Drivers, {"sets": sets})
-    return FittedDrivers(
-        drivers, {"model": MODEL, "categories": categories, "comparison": comparison}
-    )
+    return FittedDrivers(drivers, {"categories": categories, "comparison": comparison})
 
 
-# ---------------------------------------------------------------------------- who follows whom
+def _mean_misfit(
+    drivers: Sequence[str],
+    usable: Mapping[str, Sequence[Following]],
+    fitted: Mapping[str, Mapping[str, float]],
+    model: str,
+) -> float:
+    """Root of the mean square of deviations of trajectories, all driven with the medians.
 
-
-def find_followings(rows: pl.DataFrame) -> list[Following]:
-    """Stretches of at least 5 s in which a vehicle has the same one ahead in its path."""
-    vehicles = rows.filter(
-        pl.col("category").is_not_null() & (pl.col("category") != str(Category.PEDESTRIAN))
-    ).with_columns(known_sizes(), moment=(pl.col("time") * 1000.0).round().cast(pl.Int64))
-    moments = vehicles["moment"].unique().sort().to_numpy()
-    if len(moments) < 2:
-        return []
-    step = float(np.median(np.diff(moments))) / 1000.0
-    every = max(1, round(_STEP / step))
-    step *= every
-    kept = vehicles.filter(pl.col("moment").is_in(moments[::every].tolist())).sort("moment", "id")
-    columns = ("x", "y", "hdg", "length", "width")
-    places = kept.select(columns).to_numpy()
-    speeds, names = kept["speed"].to_numpy(), kept["id"].to_list()
-    times = kept["moment"].to_numpy()
-    starts = np.flatnonzero(np.diff(times, prepend=-1))
-    rows_behind: dict[tuple[str, str], list[tuple[int, int, int, float]]] = {}
-    for begin, end in pairwise([*starts.tolist(), len(places)]):
-        leader, gap = _find_leaders(places[begin:end])
-        for k in np.flatnonzero(leader >= 0).tolist():
-            pair = names[begin + k], names[begin + leader[k]]
-            entry = (int(times[begin]), begin + k, begin + int(leader[k]), float(gap[k]))
-            rows_behind.setdefault(pair, []).append(entry)
-    category_of = dict(kept.select("id", pl.col("category").cast(pl.String)).unique().iter_rows())
-    found = []
-    for (driver, leader_id), entries in sorted(rows_behind.items()):
-        cuts = [0]
-        cuts += [k + 1 for k, (a, b) in enumerate(pairwise(entries)) if b[0] - a[0] > 1500.0 * step]
-        for begin, end in pairwise([*cuts, len(entries)]):
-            own = entries[begin:end]
-            if (len(own) - 1) * step < _SHORTEST:
-                continue
-            at = np.array([row for _, row, _, _ in own])
-            # Along the heading: errors of places would add up in the length of the path.
-            hdg = places[at[:-1], 2]
-            moved = np.diff(places[at, :2], axis=0)
-            way = moved[:, 0] * np.cos(hdg) + moved[:, 1] * np.sin(hdg)
-            found.append(
-                Following(
-                    driver,
-                    leader_id,
-                    category_of[driver],
-                    step,
-                    speeds[at],
-                    np.array([gap for *_, gap in own]),
-                    speeds[[row for _, _, row, _ in own]],
-                    np.concatenate([[0.0], np.cumsum(way)]),
-                )
-            )
-    return found
-
-
-def _find_leaders(places: FloatArray) -> tuple[Any, FloatArray]:
-    """Row of the next one ahead in the path of each, or -1, and metres between the bodies."""
-    x, y, hdg, length, width = places.T
-    leader, least = np.full(len(x), -1), np.full(len(x), np.inf)
-    for i, j in find_close_pairs(x, y, math.hypot(_SIGHT, width.max())):
-        dx, dy = x[j] - x[i], y[j] - y[i]
-        c, s = np.cos(hdg)[i], np.sin(hdg)[i]
-        ahead, left = dx * c + dy * s, dy * c - dx * s
-        turn = np.abs(np.remainder(hdg[j] - hdg[i] + np.pi, 2.0 * np.pi) - np.pi)
-        meets = (ahead > 0.0) & (ahead < _SIGHT) & (turn < _ALIGNED)
-        meets &= np.abs(left) < (width[i] + width[j]) / 2.0
-        own, other = i[meets], j[meets]
-        gap = ahead[meets] - (length[own] + length[other]) / 2.0
-        order = np.lexsort((other, gap, own))  # of those ahead of one, the nearest comes first
-        rows, first = np.unique(own[order], return_index=True)
-        leader[rows], least[rows] = other[order][first], gap[order][first]
-    return leader, np.maximum(least, 0.0)
+    With own values a model that bends to anything would be the best, as an intelligent driver does
+    to waiting at a junction. Of a few drivers each has its own.
+    """
+    total, count = 0.0, 0
+    for driver in drivers:
+        of = drivers if len(drivers) >= _FEW else [driver]
+        values = {
+            name: np.array([np.median([fitted[other][name] for other in of])])
+            for name in PARAMETERS
+        }
+        wanted = np.array([fitted[driver]["speed"]])
+        mean = _mean_speed(usable[driver])
+        for following in usable[driver]:
+            gaps, speeds = drive_behind(following, values, wanted, model=model)
+            total += float(_measure_deviations(following, gaps, speeds, mean).sum())
+            count += len(following.gap)
+    return math.sqrt(total / max(count, 1))
 
 
 # ---------------------------------------------------------------------------- the models
@@ -274,7 +208,11 @@ def next_speed_of_idm(
 
 
 def drive_behind(
-    following: Following, values: Mapping[str, FloatArray], wanted: FloatArray
+    following: Following,
+    values: Mapping[str, FloatArray],
+    wanted: FloatArray,
+    *,
+    model: str = "IDM",
 ) -> tuple[FloatArray, FloatArray]:
     """Gaps and speeds of ``M`` drivers behind the recorded leader, each of shape ``(T, M)``.
 
@@ -284,7 +222,13 @@ def drive_behind(
         By the names of :data:`PARAMETERS`, of shape ``(M,)``.
     wanted
         Their desired speeds, m/s, shape ``(M,)``.
+    model
+        One of :data:`MODELS`. Krauss' drivers take their leader to brake as a car of odscen does.
     """
+    next_speed = next_speed_of_idm
+    if model == "Krauss":
+        next_speed = next_speed_of_krauss
+        values = {"leader_decel": np.array([KINDS[Category.CAR].decel]), **values}
     step, count = following.step, len(following.speed)
     leader_way = (following.gap + following.travelled).tolist()
     ahead = following.leader_speed.tolist()
@@ -293,7 +237,7 @@ def drive_behind(
     for k in range(count):
         gap = leader_way[k] - way
         gaps[k], speeds[k] = gap, speed
-        speed = next_speed_of_idm(speed, np.maximum(gap, 0.0), ahead[k], wanted, step, values)
+        speed = next_speed(speed, np.maximum(gap, 0.0), ahead[k], wanted, step, values)
         way = way + speed * step
     return gaps, speeds
 
@@ -301,15 +245,19 @@ def drive_behind(
 # ---------------------------------------------------------------------------- fitting
 
 
-def fit_driver(followings: Sequence[Following]) -> dict[str, float]:
+def fit_driver(followings: Sequence[Following], *, model: str = "IDM") -> dict[str, float]:
     """Parameters of one driver by its followings, and its desired ``speed`` (m/s) in them.
 
-    Least is the mean square of the deviations of gaps, as shares of them, and of speeds, as shares
-    of the mean. It has many local minima, so that it is searched by generations of drivers, each
-    drawn around the best of the one before (cross-entropy method), always with the same numbers.
+    Of the intelligent driver least is the mean square of the deviations of gaps, as shares of
+    them, and of speeds, as shares of the mean. It has many local minima, so that it is searched by
+    generations of drivers, each drawn around the best of the one before (cross-entropy method),
+    always with the same numbers. Krauss' driver is fitted by
+    :func:`~odscen.formats.tracks.krauss_model.fit_krauss_driver`.
     """
+    if model == "Krauss":
+        return fit_krauss_driver(followings)
     fastest = max(float(following.speed.max()) for following in followings)
-    mean = max(float(np.mean([following.speed.mean() for following in followings])), 1.0)
+    mean = _mean_speed(followings)
     low = np.array([*(_BOUNDS[name][0] for name in PARAMETERS), fastest])
     high = np.array([*(_BOUNDS[name][1] for name in PARAMETERS), 1.8 * fastest + 1.0])
 
@@ -318,9 +266,7 @@ def fit_driver(followings: Sequence[Following]) -> dict[str, float]:
         total, count = np.zeros(len(points)), 0
         for following in followings:
             gaps, speeds = drive_behind(following, values, points[:, -1])
-            wrong = (gaps - following.gap[:, None]) / np.maximum(following.gap[:, None], 1.0)
-            late = (speeds - following.speed[:, None]) / mean
-            total += (wrong**2 + late**2).sum(axis=0)
+            total += _measure_deviations(following, gaps, speeds, mean).sum(axis=0)
             count += len(following.gap)
         return total / count
 
@@ -338,6 +284,20 @@ def fit_driver(followings: Sequence[Following]) -> dict[str, float]:
             break
     best = points[int(np.argmin(costs))].tolist()
     return {**dict(zip(PARAMETERS, best, strict=False)), "speed": best[-1]}
+
+
+def _mean_speed(followings: Sequence[Following]) -> float:
+    return max(float(np.mean([following.speed.mean() for following in followings])), 1.0)
+
+
+def _measure_deviations(
+    following: Following, gaps: FloatArray, speeds: FloatArray, mean: float
+) -> FloatArray:
+    """Squares of the deviations of gaps, as shares of them, and of speeds, ``(T, M)``."""
+    wrong = (gaps - following.gap[:, None]) / np.maximum(following.gap[:, None], 1.0)
+    late = (speeds - following.speed[:, None]) / mean
+    found: FloatArray = wrong**2 + late**2
+    return found
 
 
 def _choose_held_out(drivers: Sequence[str]) -> set[str]:
@@ -401,11 +361,7 @@ def _correlation_of(values: Mapping[str, FloatArray]) -> dict[str, float]:
 
 
 def default_parameters(category: Category) -> dict[str, float]:
-    """What a normal driver of odscen has, without wishes of the scenario.
-
-    Its model is Krauss'; compared are its headway, gap, acceleration and deceleration in the
-    intelligent driver's.
-    """
+    """What a normal driver of odscen has, without wishes of the scenario; its model is Krauss'."""
     traits, style = KINDS[category], STYLES["normal"]
     return {
         "tau": HEADWAY * style.headway,
@@ -416,7 +372,7 @@ def default_parameters(category: Category) -> dict[str, float]:
 
 
 def _compare_drivers(
-    category: Category, judged: Sequence[Following], typical: Mapping[str, float]
+    category: Category, judged: Sequence[Following], typical: Mapping[str, float], model: str
 ) -> list[dict[str, Any]]:
     """Figures of drivers who were held out: recorded, fitted and default."""
     from scipy.stats import wasserstein_distance
@@ -424,12 +380,15 @@ def _compare_drivers(
     driven: dict[str, list[tuple[FloatArray, FloatArray]]] = {
         "recorded": [(following.gap, following.speed) for following in judged]
     }
-    for name, values in (("fitted", typical), ("default", default_parameters(category))):
+    for name, of_model, values in (
+        ("fitted", model, typical),
+        ("default", "Krauss", default_parameters(category)),
+    ):
         alone = {key: np.array([value]) for key, value in values.items()}
         driven[name] = []
         for following in judged:
             wanted = np.array([1.2 * float(following.speed.max()) + 0.5])
-            gaps, speeds = drive_behind(following, alone, wanted)
+            gaps, speeds = drive_behind(following, alone, wanted, model=of_model)
             driven[name].append((gaps[:, 0], speeds[:, 0]))
     step = judged[0].step
     samples = {
@@ -439,11 +398,18 @@ def _compare_drivers(
             ),
             "speed": np.concatenate([speed for _, speed in each]),
             "acceleration": np.concatenate([np.diff(speed) / step for _, speed in each]),
+            "time to collision": np.concatenate(
+                [
+                    _times_to_leader(gap, speed, following.leader_speed)
+                    for (gap, speed), following in zip(each, judged, strict=True)
+                ]
+            ),
         }
         for name, each in driven.items()
     }
     rows = []
-    for figure, unit in (("headway", "s"), ("speed", "m/s"), ("acceleration", "m/s²")):
+    units = {"headway": "s", "speed": "m/s", "acceleration": "m/s²", "time to collision": "s"}
+    for figure, unit in units.items():
         row: dict[str, Any] = {"category": str(category), "figure": figure, "unit": unit}
         truth = samples["recorded"][figure]
         if not len(truth):
@@ -456,6 +422,8 @@ def _compare_drivers(
             }
             if name != "recorded" and len(found):
                 row[name]["distance"] = round(float(wasserstein_distance(truth, found)), 4)
+        away = {name: row[name].get("distance", math.inf) for name in ("fitted", "default")}
+        row["nearer"] = min(away, key=lambda name: (away[name], name))
         rows.append(row)
     for name in ("fitted", "default"):
         errors = np.concatenate(
@@ -470,3 +438,10 @@ def _compare_drivers(
             }
         )
     return rows
+
+
+def _times_to_leader(gap: FloatArray, speed: FloatArray, ahead: FloatArray) -> FloatArray:
+    """Seconds to the leader while it is slower, 20 s at most."""
+    closing = speed - ahead
+    closes = closing > _CLOSES
+    return np.minimum(np.maximum(gap[closes], 0.0) / closing[closes], _LONGEST_TTC)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 import polars as pl
@@ -152,56 +152,93 @@ class LaneFinder:
         )
 
 
-def fit_on_map(rows: pl.DataFrame, graph: MapGraph) -> tuple[pl.DataFrame, dict[str, Any]]:
-    """Locate tracks on a map, and say how well the two agree.
+class LaneFit:
+    """Locates tracks on a map, part by part, and says how well the two agree."""
 
-    Parameters
-    ----------
-    rows
-        Tracks in the frame of the map.
+    def __init__(self, graph: MapGraph) -> None:
+        self._graph = graph
+        self._finders: dict[str, tuple[LaneFinder, pl.Series] | None] = {}
+        self._found: dict[str, list[pl.DataFrame]] = {}
 
-    Returns
-    -------
-    tuple
-        The rows with ``lane`` (``road.section.lane``; of pedestrians a walk), ``lateral`` (m, left
-        of its middle), ``on_lane`` and ``wrong_way``; rows of no category are left out. And the
-        agreement: shares and offsets of vehicles, of pedestrians, and of vehicles by road.
-    """
-    walkers = pl.col("category") == str(Category.PEDESTRIAN)
-    known = rows.filter(pl.col("category").is_not_null())
-    parts: list[pl.DataFrame] = []
-    agreement: dict[str, Any] = {}
-    for name, part in (
-        ("vehicles", known.filter(~walkers)),
-        ("pedestrians", known.filter(walkers)),
-    ):
-        is_on_foot = name == "pedestrians"
-        keys = graph.walks.lane_keys if is_on_foot else graph.lanes.lanes.keys
-        if not part.height:
-            continue
+    def place(self, rows: pl.DataFrame) -> pl.DataFrame:
+        """Rows in the frame of the map with the lanes that they are on.
+
+        Returns
+        -------
+        polars.DataFrame
+            With ``lane`` (``road.section.lane``; of pedestrians a walk), ``lateral`` (m, left of
+            its middle), ``on_lane`` and ``wrong_way``; rows of no category are left out.
+        """
+        walkers = pl.col("category") == str(Category.PEDESTRIAN)
+        known = rows.filter(pl.col("category").is_not_null())
+        placed = [
+            self._place_kind(name, part)
+            for name, part in (
+                ("vehicles", known.filter(~walkers)),
+                ("pedestrians", known.filter(walkers)),
+            )
+            if part.height
+        ]
+        return pl.concat(placed).sort("id", "time") if placed else known
+
+    def agreement(self) -> dict[str, Any]:
+        """Shares and offsets of vehicles, of pedestrians, and of vehicles by road."""
+        agreement: dict[str, Any] = {}
+        for name, parts in self._found.items():
+            found = pl.concat(parts)
+            if self._finders[name] is None:
+                agreement[name] = {"states": found.height, "on_lane": 0.0}
+                continue
+            agreement[name] = _agreement_of(found)
+            if name == "vehicles":
+                lanes = pl.col("lane").cast(pl.String)
+                roads = found.with_columns(lanes.str.split(".").list.first().alias("road"))
+                agreement["roads"] = [
+                    {"road": str(road), **_agreement_of(own)}
+                    for (road,), own in sorted(roads.group_by("road"), key=lambda item: item[0][0])
+                ]
+        return agreement
+
+    def _place_kind(self, name: str, part: pl.DataFrame) -> pl.DataFrame:
+        if name not in self._finders:
+            self._finders[name] = self._make_finder(name)
+        finder = self._finders[name]
+        if finder is None:
+            placed = part.with_columns(
+                lane=pl.lit(None, pl.Categorical),
+                lateral=pl.lit(None, pl.Float64),
+                on_lane=pl.lit(value=False),
+                wrong_way=pl.lit(value=False),
+            )
+        else:
+            lanes, keys = finder
+            columns = ("x", "y", "hdg")
+            found = lanes.locate(*(part[column].to_numpy() for column in columns))
+            moving = part["speed"].to_numpy() >= _MOVING
+            placed = part.with_columns(
+                keys.gather(found.lane).alias("lane"),
+                lateral=found.lateral,
+                on_lane=found.is_on_lane,
+                wrong_way=found.is_wrong_way & moving & (name == "vehicles"),
+            )
+        kept = placed.select("lane", "lateral", "on_lane", "wrong_way")
+        self._found.setdefault(name, []).append(kept)
+        return placed
+
+    def _make_finder(self, name: str) -> tuple[LaneFinder, pl.Series] | None:
+        on_foot = name == "pedestrians"
+        keys = self._graph.walks.lane_keys if on_foot else self._graph.lanes.lanes.keys
         if not keys:
-            agreement[name] = {"states": part.height, "on_lane": 0.0}
-            continue
-        found = LaneFinder(graph, walks=is_on_foot).locate(
-            *(part[column].to_numpy() for column in ("x", "y", "hdg"))
-        )
-        moving = part["speed"].to_numpy() >= _MOVING
-        placed = part.with_columns(
-            lane=pl.Series([str(keys[row]) for row in found.lane.tolist()]),
-            lateral=found.lateral,
-            on_lane=found.is_on_lane,
-            wrong_way=found.is_wrong_way & moving & (not is_on_foot),
-        )
-        parts.append(placed)
-        agreement[name] = _agreement_of(placed)
-        if not is_on_foot:
-            roads = placed.with_columns(pl.col("lane").str.split(".").list.first().alias("road"))
-            agreement["roads"] = [
-                {"road": str(road), **_agreement_of(own)}
-                for (road,), own in sorted(roads.group_by("road"), key=lambda item: item[0][0])
-            ]
-    placed = pl.concat(parts) if parts else known
-    return placed.sort("id", "time"), agreement
+            return None
+        names = pl.Series([str(key) for key in keys], dtype=pl.Categorical)
+        return LaneFinder(self._graph, walks=on_foot), names
+
+
+def fit_on_map(rows: pl.DataFrame, graph: MapGraph) -> tuple[pl.DataFrame, dict[str, Any]]:
+    """Locate tracks in the frame of a map, and say how well the two agree, see :class:`LaneFit`."""
+    fit = LaneFit(graph)
+    placed = fit.place(rows)
+    return placed, fit.agreement()
 
 
 def _agreement_of(placed: pl.DataFrame) -> dict[str, float]:
@@ -220,7 +257,7 @@ def _agreement_of(placed: pl.DataFrame) -> dict[str, float]:
 
 def share_on_lanes(rows: pl.DataFrame, graph: MapGraph) -> float:
     """Share of states of moving vehicles, of a thousand, on a lane of a map in its direction."""
-    moving = _moving_vehicles(rows)
+    moving = moving_vehicles(rows)
     if not moving.height or not len(graph.lanes.x):
         return 0.0
     sample = moving.gather_every(max(1, moving.height // _SAMPLE))
@@ -234,7 +271,11 @@ def share_on_lanes(rows: pl.DataFrame, graph: MapGraph) -> float:
     return float((found.is_on_lane & (np.abs(found.turn) < np.pi / 4.0)).sum()) / len(x)
 
 
-def _moving_vehicles(rows: pl.DataFrame) -> pl.DataFrame:
+Rows = TypeVar("Rows", pl.DataFrame, pl.LazyFrame)
+
+
+def moving_vehicles(rows: Rows) -> Rows:
+    """States of vehicles that move at 1 m/s or more."""
     return rows.filter(
         pl.col("category").is_not_null()
         & (pl.col("category") != str(Category.PEDESTRIAN))
@@ -254,7 +295,7 @@ def estimate_offset(rows: pl.DataFrame, graph: MapGraph) -> tuple[float, float, 
     InputError
         If too few vehicles move near a lane.
     """
-    moving = _moving_vehicles(rows)
+    moving = moving_vehicles(rows)
     if moving.height < _FEWEST:
         raise InputError(f"{moving.height} states of moving vehicles are too few for an offset")
     x, y, hdg = (moving[name].to_numpy() for name in ("x", "y", "hdg"))

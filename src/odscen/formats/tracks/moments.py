@@ -10,6 +10,7 @@ import polars as pl
 from odscen.base.categories import DEFAULT_BODY, Category
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from odscen.base.arrays import FloatArray, IntArray
@@ -18,9 +19,9 @@ _ROW: Final = np.dtype("<f4")
 _COLUMNS: Final = 5
 TIMES_FILE, FIRST_FILE, ROWS_FILE = "times.bin", "first.bin", "rows.bin"
 """Moments (float64, s), the first row of each and one past the last (int64), and rows of five
-float32: road user, x, y (m from the origin), hdg (rad), speed (m/s)."""
+float32: road user, x, y (m from the origin), hdg (rad), speed (m/s); those of one moment in any
+order."""
 MOMENT_FILES: Final = (TIMES_FILE, FIRST_FILE, ROWS_FILE)
-_AT_ONCE: Final = 2_000_000
 
 
 class Moments(NamedTuple):
@@ -48,14 +49,14 @@ class Moments(NamedTuple):
 
 
 def write_moments(
-    rows: pl.DataFrame, folder: Path
+    parts: Sequence[pl.LazyFrame], folder: Path
 ) -> tuple[list[dict[str, Any]], tuple[float, float]]:
     """Write tracks by time.
 
     Parameters
     ----------
-    rows
-        Tracks; rows of no category are left out.
+    parts
+        Tracks, each part with all of its road users; rows of no category are left out.
     folder
         Where the three files are written.
 
@@ -65,9 +66,31 @@ def write_moments(
         Road users in the order of their numbers, each with ``id``, ``category``, ``kind``,
         ``begin``, ``end`` (s), ``length`` and ``width`` (m); and the origin of places.
     """
-    known = rows.filter(pl.col("category").is_not_null())
-    users = (
-        known.group_by("id")
+    known = [part.filter(pl.col("category").is_not_null()) for part in parts]
+    users = pl.concat([_users_of(part) for part in known]).sort("begin", "id")
+    # Frames of one moment may differ by rounding, as by 1e-9 s.
+    moment = (pl.col("time") * 1000.0).round().cast(pl.Int64).alias("moment")
+    counts = pl.concat(
+        [part.group_by(moment).len().collect(engine="streaming") for part in known]
+    ).group_by("moment").agg(pl.col("len").sum()).sort("moment")  # fmt: skip
+    moments = counts["moment"].to_numpy()
+    first = np.concatenate([[0], np.cumsum(counts["len"].to_numpy())]).astype("<i8")
+    (moments / 1000.0).astype("<f8").tofile(folder / TIMES_FILE)
+    first.tofile(folder / FIRST_FILE)
+    places = (part.select("x", "y").head(1).collect() for part in known)
+    beginning = next((place for place in places if place.height), None)
+    origin = (0.0, 0.0)
+    if beginning is not None:
+        origin = (float(np.round(beginning["x"][0])), float(np.round(beginning["y"][0])))
+    _write_rows(
+        [part.with_columns(moment) for part in known], users, moments, first, origin, folder
+    )
+    return [_complete_size(user) for user in users.to_dicts()], origin
+
+
+def _users_of(part: pl.LazyFrame) -> pl.DataFrame:
+    return (
+        part.group_by("id")
         .agg(
             pl.col("category").first().cast(pl.String),
             pl.col("kind").first().cast(pl.String),
@@ -76,34 +99,50 @@ def write_moments(
             pl.col("length").median(),
             pl.col("width").median(),
         )
-        .sort("begin", "id")
+        .collect()
     )
-    listed = []
-    for user in users.to_dicts():
-        usual = DEFAULT_BODY[Category(user["category"])]
-        sizes = {name: round(user[name] or getattr(usual, name), 2) for name in ("length", "width")}
-        listed.append(user | sizes)
-    origin = (0.0, 0.0)
-    if known.height:
-        origin = (float(np.round(known["x"][0])), float(np.round(known["y"][0])))
-    numbers = users.select("id", user=pl.int_range(pl.len()).cast(pl.Float32))
-    # Frames of one moment may differ by rounding, as by 1e-9 s.
-    columns = known.lazy().join(numbers.lazy(), on="id", how="left").select(
-        (pl.col("time") * 1000.0).round().cast(pl.Int64).alias("moment"),
-        "user",
-        (pl.col("x") - origin[0]).cast(pl.Float32),
-        (pl.col("y") - origin[1]).cast(pl.Float32),
-        pl.col("hdg").cast(pl.Float32),
-        pl.col("speed").cast(pl.Float32),
-    ).sort("moment", "user").collect()  # fmt: skip
-    moments, first = np.unique(columns["moment"].to_numpy(), return_index=True)
-    (moments / 1000.0).astype("<f8").tofile(folder / TIMES_FILE)
-    np.append(first, columns.height).astype("<i8").tofile(folder / FIRST_FILE)
-    with (folder / ROWS_FILE).open("wb") as file:
-        for begin in range(0, columns.height, _AT_ONCE):
-            part = columns.slice(begin, _AT_ONCE).drop("moment").to_numpy()
-            file.write(np.ascontiguousarray(part, dtype=_ROW).tobytes())
-    return listed, origin
+
+
+def _complete_size(user: dict[str, Any]) -> dict[str, Any]:
+    usual = DEFAULT_BODY[Category(user["category"])]
+    return user | {
+        name: round(user[name] or getattr(usual, name), 2) for name in ("length", "width")
+    }
+
+
+def _write_rows(
+    parts: Sequence[pl.LazyFrame],
+    users: pl.DataFrame,
+    moments: IntArray,
+    first: IntArray,
+    origin: tuple[float, float],
+    folder: Path,
+) -> None:
+    """Write the rows of each part behind those of the parts before, moment by moment."""
+    path = folder / ROWS_FILE
+    if not first[-1]:
+        path.touch()
+        return
+    rows = np.memmap(path, dtype=_ROW, mode="w+", shape=(int(first[-1]), _COLUMNS))
+    number_of = dict(zip(users["id"], range(users.height), strict=True))
+    free = first[:-1].copy()
+    for part in parts:
+        columns = part.select("id", "moment", "x", "y", "hdg", "speed").collect()
+        numbers = columns["id"].rle().struct.unnest()
+        ends = numbers["len"].cum_sum().to_list()
+        at = np.searchsorted(moments, columns["moment"].to_numpy())
+        values = np.empty((columns.height, _COLUMNS), dtype=_ROW)
+        values[:, 1] = columns["x"].to_numpy() - origin[0]
+        values[:, 2] = columns["y"].to_numpy() - origin[1]
+        values[:, 3:] = columns.select("hdg", "speed").to_numpy()
+        tracks = zip((number_of[user] for user in numbers["value"]), [0, *ends[:-1]], ends,
+                     strict=True)  # fmt: skip
+        for number, begin, end in sorted(tracks):
+            values[begin:end, 0] = number
+            own = at[begin:end]
+            rows[free[own]] = values[begin:end]
+            free[own] += 1
+    rows.flush()
 
 
 def read_moments(folder: Path, begin: float, end: float, *, most: int) -> Moments:

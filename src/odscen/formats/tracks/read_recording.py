@@ -1,4 +1,4 @@
-"""Recorded traffic read, whatever its file is: tables, OSI traces, CommonRoad."""
+"""Recorded traffic read, whatever its file is: tables, OSI traces, CommonRoad, ScenarioNet."""
 
 from __future__ import annotations
 
@@ -7,16 +7,20 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import polars as pl
+
 from odscen.base.errors import InputError, in_file
-from odscen.formats.tracks.recorded_traffic import FARTHEST, shift_tracks
+from odscen.formats.tracks.recorded_traffic import FARTHEST, join_parts, shift_tracks
 from odscen.formats.tracks.table_schemas import TimeWindow, has_track_columns, read_track_table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from odscen.formats.base import GivenFile
     from odscen.formats.tracks.recorded_traffic import RecordedTraffic
 
+_INDEXES = ("dataset_summary.pkl", "dataset_mapping.pkl")
+"""Files of a folder of ScenarioNet that have no tracks."""
 _CLOCK = re.compile(r"(?:(?:(\d+):)?(\d{1,2}):)?(\d+(?:\.\d*)?)")
 
 
@@ -37,13 +41,26 @@ def read_recording(file: GivenFile, options: Mapping[str, str] | None = None) ->
     MissingDependencyError
         If it needs a package that is not installed.
     """
+    parts = list(read_recording_parts(file, options))
+    if len(parts) == 1:
+        return parts[0]
+    return join_parts(parts, pl.concat([part.rows for part in parts], rechunk=False))
+
+
+def read_recording_parts(
+    file: GivenFile, options: Mapping[str, str] | None = None
+) -> Iterator[RecordedTraffic]:
+    """The same, of a large table in parts, each with all tracks of its road users.
+
+    Signals are those of the first part.
+    """
     options = options or {}
     window, offset = time_window(options.get("window", "")), map_offset(options.get("offset", ""))
     with in_file(file.name):
-        recorded = _read_by_ending(file, options, window)
-    if offset == (0.0, 0.0, 0.0):
-        return recorded
-    return replace(recorded, rows=shift_tracks(recorded.rows, *offset))
+        for recorded in _read_by_ending(file, options, window):
+            moved = offset != (0.0, 0.0, 0.0)
+            rows = shift_tracks(recorded.rows, *offset) if moved else recorded.rows
+            yield replace(recorded, rows=rows)
 
 
 def choose_recording(files: Sequence[GivenFile]) -> int:
@@ -54,7 +71,7 @@ def choose_recording(files: Sequence[GivenFile]) -> int:
     InputError
         If none has, or several recordings are among them.
     """
-    endings = (".csv", ".parquet", ".osi", ".mcap", ".xml")
+    endings = (".csv", ".parquet", ".osi", ".mcap", ".xml", ".pkl")
     given = [row for row, file in enumerate(files) if file.name.lower().endswith(endings)]
     if len(given) == 1:
         return given[0]
@@ -70,6 +87,8 @@ def choose_recording(files: Sequence[GivenFile]) -> int:
 
 def is_track_file(file: GivenFile) -> bool:
     """Whether a file has tracks, by its ending or its columns."""
+    if file.name.lower() in _INDEXES:
+        return False
     if not file.name.lower().endswith((".csv", ".parquet")):
         return True
     return has_track_columns(file)
@@ -77,16 +96,20 @@ def is_track_file(file: GivenFile) -> bool:
 
 def _read_by_ending(
     file: GivenFile, options: Mapping[str, str], window: TimeWindow
-) -> RecordedTraffic:
+) -> Iterator[RecordedTraffic]:
     from odscen.formats.tracks.commonroad_obstacles import read_commonroad_obstacles
     from odscen.formats.tracks.osi_trace import read_osi_trace
+    from odscen.formats.tracks.scenario_descriptions import read_scenario_description
 
     name = file.name.lower()
     if name.endswith((".osi", ".mcap")):
-        return read_osi_trace(file.on_disk, *window)
-    if name.endswith(".xml"):
-        return read_commonroad_obstacles(file.read(), *window)
-    return read_track_table(file, options, window)
+        yield read_osi_trace(file.on_disk, *window)
+    elif name.endswith(".pkl"):
+        yield read_scenario_description(file.read(), *window)
+    elif name.endswith(".xml"):
+        yield read_commonroad_obstacles(file.read(), *window)
+    else:
+        yield from read_track_table(file, options, window)
 
 
 def time_window(text: str) -> TimeWindow:

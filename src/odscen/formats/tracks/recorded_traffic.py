@@ -7,7 +7,7 @@ derived here, and what cannot be is refused with road user and time.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import polars as pl
@@ -16,7 +16,7 @@ from odscen.base.categories import Category
 from odscen.base.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.scenario.document.rules_document import TrajectoryRow
 
@@ -59,6 +59,10 @@ _MOVED = 0.05
 """Metres between the frames before and after from which on they show a direction of motion."""
 _GAP = 1.5
 """Steps of the recording from which on frames are missing."""
+_FOLLOWS, _LEADS = "row before is its", "row after is its"
+"""Columns while a table is made: two of them say of a row whether its neighbours are of the same
+road user, which is much faster than a window over each."""
+_ON_FOOT_OR_BICYCLE: Final = "pedestrian/bicycle"
 _RIDES = 3.0
 """m/s from which on who may be a pedestrian or a bicycle is a bicycle, by the median."""
 
@@ -92,6 +96,8 @@ class RecordedTraffic:
         What was derived or left out, for people.
     unused
         Columns of a table that tracks do not need.
+    repeated
+        Rows that were there twice, and count once.
     """
 
     rows: pl.DataFrame
@@ -100,27 +106,52 @@ class RecordedTraffic:
     signals: pl.DataFrame | None = None
     notes: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
+    repeated: int = 0
 
-    def summary(self) -> dict[str, object]:
-        """Road users by category, time, area and quality, as plain values."""
-        rows = self.rows
-        kinds = rows.group_by("id").agg(pl.col("category").first().cast(pl.String))["category"]
-        counts = kinds.fill_null("other").value_counts(sort=True, name="count")
+    def summary(self, parts: Sequence[pl.LazyFrame] = ()) -> dict[str, object]:
+        """Road users by category, time, area and quality, as plain values.
+
+        Parameters
+        ----------
+        parts
+            The tracks, each part with all of its road users, if ``rows`` are not all of them.
+        """
+        parts = parts or [self.rows.lazy()]
+        users = pl.concat([part.group_by("id").agg(*_OF_USER).collect() for part in parts])
+        total = pl.concat([part.select(*_OF_PART).collect() for part in parts])
+        counts = users["category"].fill_null("other").value_counts(sort=True, name="count")
         return {
             "schema": self.schema,
-            "road_users": kinds.len(),
+            "road_users": users.height,
             "categories": dict(sorted(counts.iter_rows())),
-            "rows": rows.height,
-            "begin": rows["time"].min(),
-            "end": rows["time"].max(),
+            "rows": total["rows"].sum(),
+            "begin": total["begin"].min(),
+            "end": total["end"].max(),
             "step": self.step,
-            "x": [rows["x"].min(), rows["x"].max()],
-            "y": [rows["y"].min(), rows["y"].max()],
-            "rows_after_gaps": rows.filter(pl.col("quality") == "after_gap").height,
-            "without_size": rows.filter(pl.col("length").is_null())["id"].n_unique(),
+            "x": [total["x0"].min(), total["x1"].max()],
+            "y": [total["y0"].min(), total["y1"].max()],
+            "rows_after_gaps": total["after_gap"].sum(),
+            "without_size": int(users["without_size"].sum()),
             "signals": 0 if self.signals is None else self.signals["light"].n_unique(),
             "notes": list(self.notes),
         }
+
+
+_OF_USER: Final = (
+    pl.col("category").first().cast(pl.String),
+    pl.col("length").is_null().any().alias("without_size"),
+)
+_OF_PART: Final = (
+    pl.len().alias("rows"),
+    pl.col("time").min().alias("begin"),
+    pl.col("time").max().alias("end"),
+    *(
+        getattr(pl.col(axis), end)().alias(f"{axis}{k}")
+        for axis in ("x", "y")
+        for k, end in enumerate(("min", "max"))
+    ),
+    (pl.col("quality") == "after_gap").sum().alias("after_gap"),
+)
 
 
 def complete_tracks(
@@ -152,18 +183,22 @@ def complete_tracks(
     """
     if not given.height:
         raise InputError("no road user is in it at that time")
-    rows = _with_known_types(given).sort("id", "time")
+    rows = _with_known_types(given)
     del given
     _refuse_numbers_that_are_none(rows)
-    rows, repeated = _drop_repeated_rows(rows)
+    rows, repeated = _drop_repeated_rows(_sort_tracks(rows))
     if repeated:
-        notes = (*notes, f"{repeated} rows are there twice, and count once")
-    gaps = pl.col("time").diff().over("id")
+        notes = (*notes, _tell_repeated(repeated))
+    same = (pl.col("id") == pl.col("id").shift()).fill_null(value=False)
+    rows = rows.with_columns(same.alias(_FOLLOWS)).with_columns(
+        pl.col(_FOLLOWS).shift(-1, fill_value=False).alias(_LEADS)
+    )
+    gaps = pl.when(_FOLLOWS).then(pl.col("time").diff())
     if step is None:
         found = rows.select(gaps.median()).item()
         step = float(found) if found else 0.1
     rows = rows.with_columns(
-        _heading_of(rows.columns).alias("hdg"),
+        _heading_of(rows).alias("hdg"),
         pl.when(gaps > _GAP * step)
         .then(pl.lit("after_gap"))
         .when(pl.col("fragment") if "fragment" in rows.columns else pl.lit(value=False))
@@ -189,12 +224,49 @@ def complete_tracks(
         rows = rows.with_columns(
             x=pl.col("x") - half * pl.col("hdg").cos(), y=pl.col("y") - half * pl.col("hdg").sin()
         )
-    rows = rows.with_columns(_speed_of(rows.columns).alias("speed"))
+    rows = rows.with_columns(_speed_of(rows).alias("speed"))
     rows = rows.with_columns(
-        _acceleration_of(rows.columns).alias("acceleration"), _category_of_kind().alias("category")
+        _acceleration_of(rows).alias("acceleration"), _category_of_kind(rows).alias("category")
     )
     rows = rows.select(pl.col(name).cast(kind) for name, kind in TRACK_COLUMNS.items())
-    return RecordedTraffic(rows, schema, round(step, 6), signals, notes)
+    return RecordedTraffic(rows, schema, round(step, 6), signals, notes, repeated=repeated)
+
+
+def join_parts(parts: Sequence[RecordedTraffic], rows: pl.DataFrame) -> RecordedTraffic:
+    """One recording of parts that have road users of their own.
+
+    Parameters
+    ----------
+    rows
+        Those of all parts.
+    """
+    first, repeated = parts[0], sum(part.repeated for part in parts)
+    notes = dict.fromkeys(
+        note for part in parts for note in part.notes if note != _tell_repeated(part.repeated)
+    )
+    told = (*notes, _tell_repeated(repeated)) if repeated else tuple(notes)
+    return replace(first, rows=rows, notes=told, repeated=repeated)
+
+
+def _tell_repeated(repeated: int) -> str:
+    return f"{repeated} rows are there twice, and count once"
+
+
+def _sort_tracks(rows: pl.DataFrame) -> pl.DataFrame:
+    """By road user and time; in most files each has its rows together, and in the order of time.
+
+    Those only need to be put in the order of their road users, which is much less than to sort.
+    """
+    same = (pl.col("id") == pl.col("id").shift()).fill_null(value=False)
+    back = same & (pl.col("time") < pl.col("time").shift())
+    starts = rows.select((~same).arg_true())["id"].to_list()
+    ids = rows["id"].gather(starts).to_list()
+    if len(set(ids)) < len(ids) or rows.select(back.any()).item():
+        return rows.sort("id", "time")
+    tracks = sorted(zip(ids, starts, [*starts[1:], rows.height], strict=True))
+    if tracks == sorted(tracks, key=lambda track: track[1]):
+        return rows
+    return pl.concat([rows.slice(begin, end - begin) for _, begin, end in tracks], rechunk=True)
 
 
 def _with_known_types(rows: pl.DataFrame) -> pl.DataFrame:
@@ -256,60 +328,79 @@ def _drop_repeated_rows(rows: pl.DataFrame) -> tuple[pl.DataFrame, int]:
 def _between_neighbours(name: str) -> pl.Expr:
     """From the row before to the row after of the same road user."""
     value = pl.col(name)
-    return value.shift(-1).over("id").fill_null(value) - value.shift().over("id").fill_null(value)
+    after = pl.when(_LEADS).then(value.shift(-1)).otherwise(value)
+    return after.fill_null(value) - pl.when(_FOLLOWS).then(value.shift()).otherwise(
+        value
+    ).fill_null(value)
 
 
-def _heading_of(columns: list[str]) -> pl.Expr:
+def _usable_or_derived(
+    rows: pl.DataFrame, given: pl.Expr, most: float, value: pl.Expr, derived: pl.Expr
+) -> pl.Expr:
+    """The value where what is given is at most so much; it is derived only if some is not."""
+    usable = (given.abs() <= most).fill_null(value=False)
+    if rows.select(usable.all()).item():
+        return value
+    return pl.when(usable).then(value).otherwise(derived)
+
+
+def _heading_of(rows: pl.DataFrame) -> pl.Expr:
     dx, dy = _between_neighbours("x"), _between_neighbours("y")
     moved = (dx**2 + dy**2).sqrt() >= _MOVED
     motion = pl.when(moved).then(pl.arctan2(dy, dx))
     seen = motion.forward_fill().over("id")
     derived = seen.fill_null(motion.backward_fill().over("id")).fill_null(0.0)
-    if "hdg" not in columns:
+    if "hdg" not in rows.columns:
         return derived
-    turned = _without_whole_turns(pl.col("hdg"))
     # Of an angle with so many turns nothing is left but rounding.
-    return pl.when(pl.col("hdg").abs() <= _MOST_ANGLE).then(turned).otherwise(derived)
+    hdg = pl.col("hdg")
+    return _usable_or_derived(rows, hdg, _MOST_ANGLE, _without_whole_turns(hdg), derived)
 
 
 def _without_whole_turns(angle: pl.Expr) -> pl.Expr:
     return angle - math.tau * (angle / math.tau).round()
 
 
-def _speed_of(columns: list[str]) -> pl.Expr:
+def _speed_of(rows: pl.DataFrame) -> pl.Expr:
     way = (_between_neighbours("x") ** 2 + _between_neighbours("y") ** 2).sqrt()
     time = _between_neighbours("time")
     derived = pl.when(time > 0).then((way / time).clip(0.0, _FASTEST)).otherwise(0.0)
-    if "speed" in columns:
+    if "speed" in rows.columns:
         given = pl.col("speed").abs()
-    elif "vx" in columns:
+    elif "vx" in rows.columns:
         given = (pl.col("vx") ** 2 + pl.col("vy") ** 2).sqrt()
     else:
         return derived
-    return pl.when(given <= _FASTEST).then(given).otherwise(derived)
+    return _usable_or_derived(rows, given, _FASTEST, given, derived)
 
 
-def _acceleration_of(columns: list[str]) -> pl.Expr:
+def _acceleration_of(rows: pl.DataFrame) -> pl.Expr:
     time = _between_neighbours("time")
     change = (_between_neighbours("speed") / time).clip(-_FASTEST, _FASTEST)
     derived = pl.when(time > 0).then(change).otherwise(0.0)
-    if "acceleration" in columns:
+    if "acceleration" in rows.columns:
         given = pl.col("acceleration")
-    elif "ax" in columns:
+    elif "ax" in rows.columns:
         given = pl.col("ax") * pl.col("hdg").cos() + pl.col("ay") * pl.col("hdg").sin()
     else:
         return derived
-    return pl.when(given.abs() <= _FASTEST).then(given).otherwise(derived)
+    return _usable_or_derived(rows, given, _FASTEST, given, derived)
 
 
-def _category_of_kind() -> pl.Expr:
-    name = pl.col("kind").cast(pl.String).str.to_lowercase()
-    known = name.replace_strict(
-        {kind: str(category) for kind, category in _CATEGORIES.items()}, default=None
+def _category_of_kind(rows: pl.DataFrame) -> pl.Expr:
+    kinds = [str(kind) for kind in rows["kind"].drop_nulls().unique()]
+    categories = {kind: _CATEGORIES.get(kind.lower()) for kind in kinds}
+    known = pl.col("kind").replace_strict(
+        {kind: category and str(category) for kind, category in categories.items()},
+        default=None,
+        return_dtype=pl.String,
     )
+    either_kinds = [kind for kind in kinds if kind.lower() == _ON_FOOT_OR_BICYCLE]
+    if not either_kinds:
+        return known
     ridden = pl.col("speed").median().over("id") > _RIDES
     either = pl.when(ridden).then(pl.lit("bicycle")).otherwise(pl.lit("pedestrian"))
-    return pl.when(name == "pedestrian/bicycle").then(either).otherwise(known)
+    return pl.when(pl.col("kind").is_in(either_kinds)).then(either).otherwise(known)
 
 
 def shift_tracks(rows: pl.DataFrame, x: float, y: float, turn: float = 0.0) -> pl.DataFrame:

@@ -239,20 +239,27 @@ class _Placing:
         self._lanes = np.column_stack([lanes.x, lanes.y, lanes.hdg])
         self._walks = np.column_stack([walks.x, walks.y])
         self._router = Router(self._map, usable.drivable)
+        self._taken: tuple[set[int], set[int]] = set(), set()
         self._finder = LaneFinder(self._map)
 
     def place_actor(self, own: pl.DataFrame, category: Category) -> _Place | None:
-        """Spawn, goal and what else places an actor; ``None`` if nothing is near."""
+        """Spawn, goal and what else places an actor; ``None`` if nothing is near.
+
+        Each has a node of its own, as the document wants: who comes into view where another one
+        did has the next.
+        """
         first, last = (own.row(k, named=True) for k in (0, -1))
         if category == Category.PEDESTRIAN:
             spawn = self._near_walk(first)
             if spawn is None:
                 return None
+            self._taken[1].add(spawn)
             segment = int(self._map.walks.segment[spawn])
             return _Place(segment, {"spawn": str(walk_node_id(self._map, spawn))})
-        start = self._near_lane(self._starts, first)
+        start = self._near_lane(self._starts, first, free=True)
         if start is None:
             return None
+        self._taken[0].add(start)
         made: dict[str, Any] = {"spawn": str(node_id(self._map, start))}
         made |= self._route_along(start, last)
         place = self._finder.locate(*(np.array([first[name]]) for name in ("x", "y", "hdg")))
@@ -279,18 +286,26 @@ class _Placing:
 
     def _near_walk(self, state: dict[str, Any]) -> int | None:
         away = np.hypot(*(self._walks[self._walkable] - (state["x"], state["y"])).T)
-        if not len(away) or away.min() > _NEAR_LANE:
-            return None
-        return int(self._walkable[np.argmin(away)])
+        for k in np.argsort(away, kind="stable")[: len(self._taken[1]) + 1].tolist():
+            if away[k] <= _NEAR_LANE and int(self._walkable[k]) not in self._taken[1]:
+                return int(self._walkable[k])
+        return None
 
-    def _near_lane(self, nodes: IntArray, state: dict[str, Any]) -> int | None:
-        """The nearest of some nodes; one that leads elsewhere counts as farther away."""
+    def _near_lane(
+        self, nodes: IntArray, state: dict[str, Any], *, free: bool = False
+    ) -> int | None:
+        """The nearest of some nodes, perhaps one on which no other actor starts.
+
+        One that leads elsewhere counts as farther away.
+        """
         x, y, hdg = self._lanes[nodes].T
         away = np.hypot(x - state["x"], y - state["y"])
         cost = away + 5.0 * (1.0 - np.cos(hdg - state["hdg"]))
-        if not len(away) or away[k := int(np.argmin(cost))] > _NEAR_LANE:
-            return None
-        return int(nodes[k])
+        taken = self._taken[0] if free else set()
+        for k in np.argsort(cost, kind="stable")[: len(taken) + 1].tolist():
+            if int(nodes[k]) not in taken:
+                return int(nodes[k]) if away[k] <= _NEAR_LANE else None
+        return None
 
 
 def _fit_driving(own: pl.DataFrame, depart: float) -> dict[str, Any]:
@@ -323,12 +338,15 @@ def _rules_of(
             {"vanish": {}},
         ],
     }
-    if choice.follow != "react" or not choice.ego:
+    # SUMO's pedestrians heed no vehicle, and do not find back to a walk from everywhere.
+    reacts_to_ego = choice.follow == "react" and own["category"][0] != Category.PEDESTRIAN
+    if not (reacts_to_ego and choice.ego):
         return [follows]
     ego = names[choice.ego]
-    near = [{"distance": {"of": actor, "to": ego, "below": _CLOSE["metres"]}}]
-    if own["category"][0] != Category.PEDESTRIAN:
-        near.append({"ttc": {"of": actor, "to": ego, "below": _CLOSE["ttc"]}})
+    near = [
+        {"distance": {"of": actor, "to": ego, "below": _CLOSE["metres"]}},
+        {"ttc": {"of": actor, "to": ego, "below": _CLOSE["ttc"]}},
+    ]
     reacts = {
         "id": f"react-{actor}",
         "actor": actor,

@@ -2,24 +2,28 @@
 
 levelX (highD; inD, rounD, exiD), INTERACTION, SinD, NGSIM, Argoverse 2, omega-prime, and tables
 with columns that are named. Only the columns that are needed are read, and only the rows of the
-window, so that a file may be larger than the memory.
+window. A large file is copied once, as Parquet with what is needed of it, and made tracks of a part
+of the road users at a time, so that it may be larger than the memory.
 """
 
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import polars as pl
 
+from odscen.base.atomic_folders import scratch_folder
 from odscen.base.errors import InputError, in_file
 from odscen.base.shown import shown, shown_id
 from odscen.formats.tracks.osi_trace import OSI_OBJECTS, OSI_VEHICLE, OSI_VEHICLES
 from odscen.formats.tracks.recorded_traffic import RecordedTraffic, complete_tracks
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from odscen.formats.base import GivenFile
 
@@ -31,6 +35,11 @@ _SAME = 1e-6
 """Seconds by which a frame may miss the window and still be of it."""
 _LISTED = 12
 """Values that a message lists at most."""
+LARGE_TABLE: Final = 100_000_000
+"""Bytes of a table from which on it is read in parts."""
+_PACKED: Final = 4
+"""Bytes of text for each byte of Parquet, about."""
+_ROWS_OF_PART: Final = 1_500_000
 _ROLES: Final[tuple[str, ...]] = (
     *("time", "id", "x", "y", "hdg", "speed", "acceleration", "length", "width", "kind"),
     *("vx", "vy", "ax", "ay"),
@@ -61,6 +70,8 @@ class TrackFile:
         Rows outside are left out.
     used
         Columns that have been read.
+    copy
+        Of a large file, from which rows are then read part by part.
     """
 
     file: GivenFile
@@ -68,6 +79,12 @@ class TrackFile:
     options: Mapping[str, str]
     window: TimeWindow
     used: set[str] = field(default_factory=set)
+    copy: TableCopy | None = None
+
+    @property
+    def step(self) -> float | None:
+        """Seconds between two frames, once a part has shown them."""
+        return None if self.copy is None else self.copy.step
 
     def read(
         self,
@@ -76,6 +93,8 @@ class TrackFile:
         where: pl.Expr | None = None,
     ) -> pl.DataFrame:
         """Rows of the window with these expressions of columns of these types."""
+        if self.copy is not None and self.copy.is_made:
+            return self.copy.rows()
         table = _scan_table(self.file, columns)
         if where is not None:
             table = table.filter(where)
@@ -84,7 +103,12 @@ class TrackFile:
         _refuse_missing_columns(self.file, self.used, self.columns)
         inside = pl.col("time").is_between(self.window.begin - _SAME, self.window.end + _SAME)
         inside |= ~pl.col("time").is_finite()  # a row of no time is refused later, and not lost
-        return _collect_table(self.file, columns, table.select(expressions).filter(inside))
+        wanted = table.select(expressions).filter(inside)
+        if self.copy is None:
+            return _collect_table(self.file, columns, wanted)
+        _collect_table(self.file, columns, wanted, into=self.copy.path)
+        self.copy.cut()
+        return self.copy.rows()
 
     def beside(self, ending: str, other: str) -> GivenFile:
         """The file whose name ends otherwise.
@@ -103,6 +127,78 @@ class TrackFile:
         return self.file.other(f"{stem}{other}{rest}")
 
 
+class TableCopy:
+    """What is needed of a large table, on the disk, and which road users are read now.
+
+    Parameters
+    ----------
+    path
+        Where it is written, as Parquet.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.step: float | None = None
+        self._parts: list[pl.Series] = []
+        self._part = 0
+
+    @property
+    def is_made(self) -> bool:
+        """Whether the file has been copied."""
+        return bool(self._parts)
+
+    @property
+    def is_last(self) -> bool:
+        """Whether no road users are left for another part."""
+        return self._part + 1 >= len(self._parts)
+
+    @property
+    def share(self) -> float:
+        """Share of the parts that have been read."""
+        return (self._part + 1) / max(len(self._parts), 1)
+
+    def next_part(self) -> None:
+        """Read the next part from now on."""
+        self._part += 1
+
+    def cut(self) -> None:
+        """Cut its road users into parts, in the order in which tracks are sorted."""
+        table = pl.scan_parquet(self.path)
+        counts = (
+            table.group_by(self._find_key()).agg(pl.len().alias("rows")).collect(engine="streaming")
+        )
+        counts = counts.sort(pl.col(self._find_key()).cast(pl.String))
+        before = pl.col("rows").cum_sum() - pl.col("rows")
+        counts = counts.with_columns(part=before // _ROWS_OF_PART)
+        cut = counts.partition_by("part", maintain_order=True) or [counts]
+        self._parts = [part[self._find_key()] for part in cut]
+
+    def rows(self) -> pl.DataFrame:
+        """Rows of the road users of this part."""
+        own, key = self._parts[self._part], pl.col(self._find_key())
+        here = key.is_in(own.drop_nulls().implode())
+        if own.null_count():  # who has no id is refused later, and not lost
+            here |= key.is_null()
+        return pl.scan_parquet(self.path).filter(here).collect(engine="streaming")
+
+    def refuse_again(self, ids: pl.Series) -> None:
+        """Refuse road users of a file beside it who have the ids of others in this one.
+
+        Raises
+        ------
+        InputError
+            If there is one; names it.
+        """
+        known = pl.concat([part.cast(pl.String) for part in self._parts])
+        twice = ids.unique().sort().filter(ids.unique().sort().is_in(known.implode()))
+        if len(twice):
+            raise InputError("it is in both files", element=f"road user {twice[0]}")
+
+    def _find_key(self) -> str:
+        columns = pl.scan_parquet(self.path).collect_schema().names()
+        return next(name for name in ("number", "id") if name in columns)
+
+
 class TableSchema(NamedTuple):
     """A published schema: the columns by which it is recognised, and what reads it."""
 
@@ -113,8 +209,8 @@ class TableSchema(NamedTuple):
 
 def read_track_table(
     file: GivenFile, options: Mapping[str, str], window: TimeWindow
-) -> RecordedTraffic:
-    """Read a table of tracks.
+) -> Iterator[RecordedTraffic]:
+    """Read a table of tracks; a large one gives parts, each with all of its road users.
 
     Raises
     ------
@@ -122,11 +218,28 @@ def read_track_table(
         If no schema has its columns, or a value is none that its column can have; names the file,
         the column and the row.
     """
-    with in_file(file.name):
+    with ExitStack() as stack:
+        stack.enter_context(in_file(file.name))
         given = TrackFile(file, _columns_of(file), options, window)
-        recorded = _read_with_schema(given)
-    unused = [name for name in given.columns if name not in given.used]
-    return replace(recorded, unused=tuple(unused))
+        if _size_of(file) > LARGE_TABLE:
+            folder = stack.enter_context(scratch_folder())
+            given = replace(given, copy=TableCopy(folder / "rows.parquet"))
+        while True:
+            recorded = _read_with_schema(given)
+            unused = [name for name in given.columns if name not in given.used]
+            yield replace(recorded, unused=tuple(unused))
+            if given.copy is None or given.copy.is_last:
+                return
+            given.copy.step = recorded.step
+            given.copy.next_part()
+
+
+def _size_of(file: GivenFile) -> int:
+    try:
+        size = file.on_disk.stat().st_size
+    except OSError:
+        return 0
+    return size * (_PACKED if file.name.lower().endswith(".parquet") else 1)
 
 
 def has_track_columns(file: GivenFile) -> bool:
@@ -171,10 +284,18 @@ def _columns_of(file: GivenFile) -> tuple[str, ...]:
         raise InputError(f"not a table: {_what_is_said(error)}", file=file.name) from error
 
 
-def _collect_table(file: GivenFile, types: Types, table: pl.LazyFrame) -> pl.DataFrame:
-    """Read it in pieces; what cannot be read is looked for in a second reading, as text."""
+def _collect_table(
+    file: GivenFile, types: Types, table: pl.LazyFrame, *, into: Path | None = None
+) -> pl.DataFrame:
+    """Read it in pieces; what cannot be read is looked for in a second reading, as text.
+
+    With ``into`` it is written there, and nothing is given.
+    """
     try:
-        return table.collect(engine="streaming")
+        if into is None:
+            return table.collect(engine="streaming")
+        table.sink_parquet(into, compression="lz4")
+        return pl.DataFrame()
     except (pl.exceptions.PolarsError, OSError) as error:
         _refuse_wrong_value(file, types)
         raise InputError(f"it cannot be read: {_what_is_said(error)}", file=file.name) from error
@@ -227,6 +348,8 @@ def _with_file_beside(
 ) -> pl.DataFrame:
     """Rows with those of the file that has the other road users of the same recording."""
     name = given.file.name
+    if given.copy is not None and not given.copy.is_last:
+        return rows
     for own, other in (prefixes, prefixes[::-1]):
         if not name.startswith(own):
             continue
@@ -238,6 +361,8 @@ def _with_file_beside(
             with in_file(file.name):
                 columns = _columns_of(file)
                 more = read(TrackFile(file, columns, given.options, given.window))
+                if given.copy is not None:
+                    given.copy.refuse_again(more["id"])
             return pl.concat([rows, more], how="diagonal")
     return rows
 
@@ -250,7 +375,7 @@ def _read_interaction(given: TrackFile) -> RecordedTraffic:
     rows = _with_file_beside(
         given, _interaction_rows(given), ("vehicle_tracks", "pedestrian_tracks"), _interaction_rows
     )
-    return complete_tracks(rows, "interaction")
+    return complete_tracks(rows, "interaction", step=given.step)
 
 
 def _interaction_rows(given: TrackFile) -> pl.DataFrame:
@@ -268,7 +393,7 @@ def _interaction_rows(given: TrackFile) -> pl.DataFrame:
 
 def _chosen_part(given: TrackFile, column: str, option: str) -> pl.Expr | None:
     """Rows of one of several recordings that a file has, each with its own time."""
-    if column not in given.columns:
+    if column not in given.columns or (given.copy is not None and given.copy.is_made):
         return None
     parts = _collect_table(given.file, {}, _scan_table(given.file, {}).select(column).unique())
     known = sorted(map(str, parts[column].drop_nulls()), key=lambda part: (len(part), part))
@@ -295,7 +420,7 @@ def _read_sind(given: TrackFile) -> RecordedTraffic:
         if given.file.name != given.file.where:
             raise
         signals = None  # of files that were sent, it was not
-    return complete_tracks(rows, "sind", signals=signals)
+    return complete_tracks(rows, "sind", step=given.step, signals=signals)
 
 
 def _sind_rows(given: TrackFile) -> pl.DataFrame:
@@ -546,7 +671,7 @@ def _read_omega_prime(given: TrackFile) -> RecordedTraffic:
             for name, new in zip(number[3:7], ("vx", "vy", "ax", "ay"), strict=True)
         ),
     )
-    return complete_tracks(rows, "omega-prime")
+    return complete_tracks(rows, "omega-prime", step=given.step)
 
 
 def _read_own_table(given: TrackFile) -> RecordedTraffic:
@@ -602,7 +727,7 @@ def _read_roles(
         ),
         *(pl.lit(value).alias(role) for role, value in _USUAL.items() if role not in named),
     )
-    return complete_tracks(rows, schema)
+    return complete_tracks(rows, schema, step=given.step)
 
 
 _USUAL: Final = {"id": "1", "kind": "car"}

@@ -169,10 +169,13 @@ class DrivingRecorder:
         ``.npz`` file to write.
     every
         Of so many steps one is recorded.
+    lights
+        Whether lights are seen.
     """
 
     file: str
     every: float = 4.0
+    lights: bool = True
     _steps: int = 0
     _before: tuple[Int32Array, FloatArray, Array] | None = None
     _rows: list[tuple[Array, FloatArray, FloatArray]] = field(default_factory=list)
@@ -193,9 +196,15 @@ class DrivingRecorder:
             faster = (seen.speed[new] - speed[old]) / state.step_length
             self._rows.append((x[old], faster, speed[old]))
         due = self._steps % max(int(self.every), 1) == 0
-        self._before = (seen.index, seen.speed, sight(seen, state)) if due else None
+        self._before = (seen.index, seen.speed, self._sense_road(seen, state)) if due else None
         self._steps += 1
         return DrivingAction(speed=seen.speed), np.zeros(len(seen), dtype=np.bool_)
+
+    def _sense_road(self, seen: RoadObservation, scene: BehaviourScene) -> Array:
+        x = sight(seen, scene)
+        if not self.lights:
+            x[:, [FEATURES.index(color) for color in ("red", "yellow", "green")]] = 0.0
+        return x
 
     def close(self) -> None:
         """Write it, if there is any."""

@@ -204,7 +204,7 @@ DENSER = 1.0
 UNLIKE = 1.0
 """Logarithm of how much denser traffic it is told of, from which on a map is unlike the data.
 
-In the mean over the passes it is at most 0.6 on varied towns and 0.9 on one with five vehicles;
+In the mean over the passes it is at most 0.7 on varied towns and 0.8 on one with six vehicles;
 mostly 1.0 to 2.0 where a motorway, or a road without a junction, is all that there is.
 """
 MORE = 1.05

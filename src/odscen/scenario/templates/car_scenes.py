@@ -29,7 +29,7 @@ from odscen.scenario.templates.scene_template import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.scenario.templates.scene_template import TemplateSite
 
@@ -39,22 +39,34 @@ _AFTER = 4.0
 """Seconds of the run that a stretch has room for after the scene."""
 _STRAIGHT = 0.1
 """Radians that a stretch may bend."""
+_SETTLING = 4.0
+"""Seconds that a gap needs to settle, and one more for each metre."""
+LEAST_CLOSING = 1.0
+"""m/s by which the ego is faster than who cuts in, at least."""
+_MOST_OFFSET = 10.0
+"""Metres from its node at which a vehicle may start at most."""
 INTRUSION = 0.3
 """Metres over the lane's border at which UN R157 counts a vehicle as in the lane (5.2.5.2)."""
 
 
 def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+    return _place_cut_in(site, (values,))
+
+
+def _place_cut_in(site: TemplateSite, sets: Sequence[Mapping[str, float]]) -> TemplateScene:
+    """Place it with the first of several sets of numbers, and with room for each of them."""
+    values = sets[0]
     ego, speed, over = values["ego_speed"], values["speed"], values["over"]
-    closing = ego - speed
-    if closing < 1.0:
-        raise InputError(
-            f"ego_speed must be at least 1 m/s above speed ({speed:g} m/s), not {ego:g} m/s"
-        )
-    # UN R157, 5.2.5.2: TTC at the intrusion above v_rel / (2 * 6 m/s2) + 0.35 s
-    intrusion = values.get("ttc", closing / 12.0 + 0.35)
     length, width = body_length(site, Category.CAR), site.usable.bodies[Category.CAR].width
-    lead = length + (intrusion + over + values["approach"]) * closing
-    metres = _REAR + lead + speed * (values["approach"] + over + _AFTER)
+    intrusion = _time_of_intrusion(values)
+    metres = max(
+        _REAR
+        + length
+        + (_time_of_intrusion(each) + each["over"] + each["approach"])
+        * (each["ego_speed"] - each["speed"])
+        + each["speed"] * (each["approach"] + each["over"] + _AFTER)
+        for each in sets
+    )
 
     def place(stretch: LaneStretch) -> TemplateScene:
         near = near_side(site, stretch)
@@ -62,10 +74,14 @@ def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
         centre = apart(site, int(stretch.nodes[0]), int(lane.nodes[0]))
         border = site.region.graph.lanes.width[lane.nodes[0]] / 2.0 - width / 2.0 + INTRUSION
         # half-cosine: offset = centre (1 - cos(pi t / over)) / 2
-        delay = over / math.pi * math.acos(1.0 - 2.0 * min(border / centre, 1.0))
-        begins = intrusion + delay
+        share = math.acos(1.0 - 2.0 * min(border / centre, 1.0)) / math.pi
+        begins = intrusion + share * over
         start = node_near(site, stretch, _REAR)
-        ahead = length + (begins + values["approach"]) * closing
+        ahead = length + max(
+            (_time_of_intrusion(each) + share * each["over"] + each["approach"])
+            * (each["ego_speed"] - each["speed"])
+            for each in sets
+        )
         other = node_near(site, lane, _REAR + ahead)
         last = int(stretch.nodes[-1])
         side = LEFT if _is_left(site, lane, stretch) else RIGHT
@@ -83,7 +99,24 @@ def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
                     {"lane": {"by": side, "over": over}},
                 ),
             ),
-            duration=math.ceil(values["approach"] + over + 10.0),
+            duration=math.ceil(
+                max(
+                    (ahead - length) / (each["ego_speed"] - each["speed"]) + each["over"]
+                    for each in sets
+                )
+                + 10.0
+            )
+            if len(sets) > 1
+            else math.ceil(values["approach"] + over + 10.0),
+            formulas={
+                ("actors", "ego", "speed"): "$ego_speed",
+                ("actors", "ego", "initial_speed"): "$ego_speed",
+                ("actors", "challenger", "speed"): "$speed",
+                ("actors", "challenger", "initial_speed"): "$speed",
+                ("rules", "cruise", "then", 0, "speed", "to"): "$speed",
+                ("rules", "cut-in", "when", "ttc", "below"): f"$ttc + {share:.6f} * $over",
+                ("rules", "cut-in", "then", 0, "lane", "over"): "$over",
+            },
             wanted=(
                 f"Ego {kmh(ego)}, challenger {kmh(speed)}. The challenger begins to change lanes "
                 f"at a time to collision of {begins:.2f} s, so that it is {INTRUSION:g} m over "
@@ -93,6 +126,23 @@ def _cut_in(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
 
     found, why = site.stretches.of_length(metres, bend=_STRAIGHT)
     return first_fit(found, why, place, what="a cut-in", map_name=site.region.graph.map_name)
+
+
+def _time_of_intrusion(values: Mapping[str, float]) -> float:
+    """Time to collision when the vehicle is in the lane; without a wanted one that of UN R157.
+
+    Raises
+    ------
+    InputError
+        If the ego is not faster.
+    """
+    ego, speed = values["ego_speed"], values["speed"]
+    if ego - speed < LEAST_CLOSING:
+        raise InputError(
+            f"ego_speed must be at least 1 m/s above speed ({speed:g} m/s), not {ego:g} m/s"
+        )
+    # 5.2.5.2: TTC at the intrusion above v_rel / (2 * 6 m/s2) + 0.35 s
+    return values.get("ttc", (ego - speed) / 12.0 + 0.35)
 
 
 def _stretch_on_either_side(site: TemplateSite, stretch: LaneStretch, near: int) -> LaneStretch:
@@ -138,14 +188,32 @@ CUT_IN = SceneTemplate(
         TemplateParameter("approach", 2, 0.5, 20, "s", "time before it", "Lead time"),
     ),
     place=_cut_in,
+    place_open=_place_cut_in,
 )  # fmt: skip
 
 
 def _lead_brakes(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene:
+    return _place_lead_brakes(site, (values,))
+
+
+def _place_lead_brakes(site: TemplateSite, sets: Sequence[Mapping[str, float]]) -> TemplateScene:
+    """Place it with the first of several sets of numbers, and with room for each of them."""
+    values = sets[0]
     speed, gap, rate = values["speed"], values["gap"], values["deceleration"]
-    length, settle = body_length(site, Category.CAR), values["approach"]
+    length = body_length(site, Category.CAR)
+    # What a start cannot be moved by has to settle first.
+    far = max(abs(each["gap"] - gap) for each in sets) - _MOST_OFFSET / 2.0
+    settle = max(each["approach"] for each in sets) + (_SETTLING + far if far > 0.0 else 0.0)
     ahead = gap + length
-    metres = _REAR + ahead + speed * settle + speed**2 / (2.0 * rate) + length
+    metres = max(
+        _REAR
+        + length
+        + each["gap"]
+        + each["speed"] * settle
+        + each["speed"] ** 2 / (2.0 * each["deceleration"])
+        + length
+        for each in sets
+    )
 
     def place(stretch: LaneStretch) -> TemplateScene:
         start = node_near(site, stretch, _REAR)
@@ -171,7 +239,22 @@ def _lead_brakes(site: TemplateSite, values: Mapping[str, float]) -> TemplateSce
                     {"brake": {"by": rate}},
                 ),
             ),
-            duration=math.ceil(settle + speed / rate + 8.0),
+            duration=math.ceil(
+                max(settle + each["speed"] / each["deceleration"] for each in sets) + 8.0
+            ),
+            formulas={
+                ("actors", "ego", "speed"): "$speed",
+                ("actors", "ego", "initial_speed"): "$speed",
+                ("actors", "lead", "speed"): "$speed",
+                ("actors", "lead", "initial_speed"): "$speed",
+                ("rules", "cruise", "then", 0, "speed", "to"): "$speed",
+                ("rules", "follow", "then", 0, "keep_gap", "metres"): "$gap",
+                # As near to the wanted gap as a start may be moved; the rest settles.
+                ("actors", "lead", "longitudinal_offset"): (
+                    f"min({_MOST_OFFSET:g}, max(-{_MOST_OFFSET:g}, $gap - {gap - beyond:.3f}))"
+                ),
+                ("rules", "brake", "then", 0, "brake", "by"): "$deceleration",
+            },
             wanted=(
                 f"Both at {kmh(speed)}, {gap:g} m apart. After {settle:g} s the lead vehicle "
                 f"brakes with {rate:g} m/s2 to a standstill, and the ego drives itself."
@@ -209,6 +292,7 @@ LEAD_BRAKES = SceneTemplate(
         ),
     ),
     place=_lead_brakes,
+    place_open=_place_lead_brakes,
 )
 
 

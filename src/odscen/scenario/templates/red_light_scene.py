@@ -61,7 +61,7 @@ def _red_light(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene
     }
 
     def place(stretch: LaneStretch) -> TemplateScene:
-        return _at_light(site, meetings[id(stretch)], values)
+        return _place_at_light(site, meetings[id(stretch)], values)
 
     candidates = [meeting.ego for meeting in meetings.values()]
     what = "a vehicle that runs a red light"
@@ -69,11 +69,11 @@ def _red_light(site: TemplateSite, values: Mapping[str, float]) -> TemplateScene
     return first_fit(candidates, why, place, what=what, map_name=map_name)
 
 
-def _at_light(
+def _place_at_light(
     site: TemplateSite, found: _CrossingPaths, values: Mapping[str, float]
 ) -> TemplateScene:
     graph = site.region.graph
-    mine, theirs = _where_they_meet(site, found)
+    mine, theirs = _find_meeting_nodes(site, found)
     ego, fast = values["ego_speed"], values["speed"]
     needed = ego**2 / (2.0 * _STARTING) + ego * _STEADY
     at = min(found.stop_line - _FRONT, metres_at(found.ego, mine) - needed)
@@ -185,7 +185,7 @@ def _nodes_behind(site: TemplateSite, node: int, out: str) -> list[int]:
     )
 
 
-def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, int]:
+def _find_meeting_nodes(site: TemplateSite, found: _CrossingPaths) -> tuple[int, int]:
     """Nodes of both paths next to where they cross.
 
     Raises
@@ -205,7 +205,7 @@ def _where_they_meet(site: TemplateSite, found: _CrossingPaths) -> tuple[int, in
     for stretch in (found.ego, found.runner):
         away = np.hypot(lanes.x[stretch.nodes] - crossed.x, lanes.y[stretch.nodes] - crossed.y)
         nodes.append(int(stretch.nodes[np.argmin(away)]))
-    if not all(metres_at(one, node) > line for one, node, line in (
+    if not all(metres_at(placed_path, node) > line for placed_path, node, line in (
         (found.ego, nodes[0], found.stop_line), (found.runner, nodes[1], found.runner_line),
     )):  # fmt: skip
         raise UnfitPlaceError("cross before the stop line")

@@ -271,7 +271,7 @@ class WalkSides:
         if across + float(abs(left[around == end][0])) > WIDEST:
             raise UnfitPlaceError(f"are wider than {WIDEST:.0f} m")
         meets = float(lanes.x[node] + met * c), float(lanes.y[node] + met * s)
-        if self._near_crosswalk(meets):
+        if self._is_near_crosswalk(meets):
             raise UnfitPlaceError(f"have a crosswalk within {_FROM_CORNER:.0f} m")
         goal = self._goal_behind(start, end)
         there: str | list[float] = walk_node_id(self._graph, end)
@@ -297,7 +297,7 @@ class WalkSides:
         order = np.lexsort((goals[fits], metres[fits]))
         return int(goals[fits][order[0]]) if len(order) else None
 
-    def _near_crosswalk(self, place: tuple[float, float]) -> bool:
+    def _is_near_crosswalk(self, place: tuple[float, float]) -> bool:
         if self._crosswalk_tree is None:
             return False
         return bool(self._crosswalk_tree.query(place)[0] < _FROM_CORNER)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -64,6 +64,9 @@ class TemplateScene:
         The geometry that follows from the parameters, in words with numbers.
     criteria
         What must come out of a run for it to pass, as in the document.
+    formulas
+        Where a scene is left open: formula of the numbers that follow from parameters, by its place
+        (``"actors"`` or ``"rules"``, id, keys).
     """
 
     actors: tuple[dict[str, Any], ...]
@@ -71,6 +74,7 @@ class TemplateScene:
     duration: float
     wanted: str
     criteria: tuple[str, ...] = (NO_COLLISION,)
+    formulas: Mapping[tuple[str | int, ...], str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,9 @@ class SceneTemplate:
         Its numbers.
     place
         Places it, or raises :class:`~odscen.scenario.templates.scene_sites.NoPlaceError`.
+    place_open
+        Places it with room for each of several sets of numbers, all of which are complete, and with
+        formulas, so that a sweep can vary them; ``None`` if where it begins depends on them.
     """
 
     name: str
@@ -98,6 +105,7 @@ class SceneTemplate:
     needs: str
     parameters: tuple[TemplateParameter, ...]
     place: Callable[[TemplateSite, Mapping[str, float]], TemplateScene]
+    place_open: Callable[[TemplateSite, Sequence[Mapping[str, float]]], TemplateScene] | None = None
 
     def values(self, given: Mapping[str, float]) -> dict[str, float]:
         """Numbers to place it with; those that follow from others are left out.

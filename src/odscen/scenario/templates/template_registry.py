@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from odscen.base.errors import NotFoundError
+from odscen.base.errors import InputError, NotFoundError
 from odscen.lanegraph.query import largest_part
 from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.edits.settings_edits import new_scenario
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.scenario.placing.region import Usable
     from odscen.scenario.signals.light import Light
-    from odscen.scenario.templates.scene_template import SceneTemplate
+    from odscen.scenario.templates.scene_template import SceneTemplate, TemplateScene
 
 TEMPLATES: dict[str, SceneTemplate] = {
     template.name: template
@@ -99,16 +99,87 @@ def place_template(
         If the map has no room; says where was looked and why not.
     """
     wanted = template.values(values)
-    roi = largest_part(graph.segments)
+    site, roi = _site_of_map(graph, usable, lights)
+    data = _document_of_scene(template, template.place(site, wanted), graph, roi, name=name)
+    return loads(json.dumps(data))
+
+
+def place_open_template(
+    template: SceneTemplate,
+    graph: MapGraph,
+    usable: Usable,
+    lights: Sequence[Light],
+    *,
+    sets: Sequence[Mapping[str, float]],
+    name: str,
+) -> Scenario:
+    """Place a template so that its numbers are parameters of the scenario, which a sweep varies.
+
+    Parameters
+    ----------
+    sets
+        Several sets of its numbers, for each of which there is to be room. The first one is what
+        the parameters are, all together are between which bounds they may be.
+    name
+        Of the scenario.
+
+    Raises
+    ------
+    InputError
+        If a number is unknown or out of its range, or where the template begins depends on them.
+    NoPlaceError
+        If the map has no room; says where was looked and why not.
+    """
+    if template.place_open is None:
+        raise InputError(f"the numbers of template {template.name!r} cannot be varied in one place")
+    wanted = [template.values(values) for values in sets]
+    site, roi = _site_of_map(graph, usable, lights)
+    scene = template.place_open(site, wanted)
+    data = _document_of_scene(template, scene, graph, roi, name=name)
+    for (part, ident, *keys, last), formula in scene.formulas.items():
+        place: Any = next(entry for entry in data[str(part)] if entry["id"] == ident)
+        for key in keys:
+            place = place[key]
+        place[last] = formula
+    used = " ".join(scene.formulas.values())
+    data["parameters"] = {
+        number.name: {
+            "value": wanted[0][number.name],
+            "unit": number.unit,
+            "min": min(values[number.name] for values in wanted),
+            "max": max(values[number.name] for values in wanted),
+            "description": number.meaning,
+        }
+        for number in template.parameters
+        if f"${number.name}" in used
+    }
+    return loads(json.dumps(data))
+
+
+def _site_of_map(
+    graph: MapGraph, usable: Usable, lights: Sequence[Light]
+) -> tuple[TemplateSite, tuple[str, ...]]:
+    """Look at the largest connected part of a map; its segments are the second."""
+    roi = tuple(largest_part(graph.segments))
     region = Region.of(graph, roi)
-    site = TemplateSite(
-        region, usable, lights, LaneStretches(region, usable), WalkSides(region, usable)
-    )
-    scene = template.place(site, wanted)
+    stretches, sides = LaneStretches(region, usable), WalkSides(region, usable)
+    return TemplateSite(region, usable, lights, stretches, sides), roi
+
+
+def _document_of_scene(
+    template: SceneTemplate,
+    scene: TemplateScene,
+    graph: MapGraph,
+    roi: Sequence[str],
+    *,
+    name: str,
+) -> dict[str, Any]:
     words = f"{template.summary} {scene.wanted} Source: {template.source}"
-    data = json.loads(dumps(new_scenario(graph, name=name, roi=roi, description=words)))
+    data: dict[str, Any] = json.loads(
+        dumps(new_scenario(graph, name=name, roi=roi, description=words))
+    )
     data["drivers"] = {"sets": [STEADY_DRIVER]}
     data["actors"], data["rules"] = list(scene.actors), list(scene.rules)
     data["criteria"] = list(scene.criteria)
     data["simulation"] = {"duration": scene.duration}
-    return loads(json.dumps(data))
+    return data

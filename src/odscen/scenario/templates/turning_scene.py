@@ -68,7 +68,7 @@ def _place_turning(site: TemplateSite, values: Mapping[str, float]) -> TemplateS
         turn = turns[id(path)]
         for behind in np.arange(*_BEHIND, 2.0).tolist():
             try:
-                return _at_turn(site, turn, behind, values)
+                return _place_at_turn(site, turn, behind, values)
             except UnfitPlaceError as error:
                 unfit = error
         raise unfit
@@ -78,7 +78,7 @@ def _place_turning(site: TemplateSite, values: Mapping[str, float]) -> TemplateS
     return first_fit(paths, why, place, what=what, map_name=site.region.graph.map_name)
 
 
-def _at_turn(
+def _place_at_turn(
     site: TemplateSite, turn: _Turn, behind: float, values: Mapping[str, float]
 ) -> TemplateScene:
     speed, walking = values["ego_speed"], values["walking_speed"]
@@ -121,7 +121,9 @@ def _at_turn(
 def _find_turns(site: TemplateSite, why: Counter[str]) -> Iterator[_Turn]:
     """Paths over a lane and through a junction onto another road, in the map's order."""
     lanes = site.region.graph.lanes
-    junction = np.array([one is not None for one in lanes.lanes.junctions], dtype=np.bool_)
+    junction = np.array(
+        [junction is not None for junction in lanes.lanes.junctions], dtype=np.bool_
+    )
     follows = lanes.relation == Relation.SUCCESSOR
     after: dict[int, list[tuple[int, float]]] = {}
     edges = zip(lanes.source[follows], lanes.target[follows], lanes.length[follows], strict=True)

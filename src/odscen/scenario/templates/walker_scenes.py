@@ -44,6 +44,8 @@ _BEYOND = 12.0
 _KERB, _HIDDEN = 0.1, 1.0
 """Metres beside the lane at which a vehicle is parked, and at which a hidden one is at least."""
 _FOR_EVER = 3600.0
+_FIRST_STEP = 0.3
+"""Metres that a pedestrian walks at least before the ego's front is at its path."""
 _REACHES = (4.0, 7.0, 10.0, 14.0)
 """Metres from the sidewalk to that place, at most; short ones first, they need the least road."""
 
@@ -64,7 +66,16 @@ def _runs_out(
     for hides, speed, reach in product(hidden, speeds, _REACHES):
         try:
             wanted = {**values, "ego_speed": speed}
-            return _crossing_scene(site, wanted, reach, walker=walker, hidden=hides)
+            return _crossing_scene(site, (wanted,), reach, walker=walker, hidden=hides)
+        except NoPlaceError as error:
+            refused = error
+    raise refused
+
+
+def _mid_block_of(site: TemplateSite, sets: Sequence[Mapping[str, float]]) -> TemplateScene:
+    for reach in _REACHES:
+        try:
+            return _crossing_scene(site, sets, reach, walker="walker", hidden=_HiddenBy.NOTHING)
         except NoPlaceError as error:
             refused = error
     raise refused
@@ -72,15 +83,25 @@ def _runs_out(
 
 def _crossing_scene(
     site: TemplateSite,
-    values: Mapping[str, float],
+    sets: Sequence[Mapping[str, float]],
     reach: float,
     *,
     walker: str,
     hidden: _HiddenBy,
 ) -> TemplateScene:
+    """Place it with the first of several sets of numbers, and with room for each of them."""
+    values = sets[0]
     speed, walking = values["ego_speed"], values["walking_speed"]
-    lead_in = speed * values["approach"] + body_length(site, Category.CAR) / 2.0
-    metres = _REAR + lead_in + speed * reach / walking + _BEYOND
+    half = body_length(site, Category.CAR) / 2.0
+    width = site.usable.bodies[Category.CAR].width
+    metres = max(
+        _REAR
+        + each["ego_speed"] * each["approach"]
+        + half
+        + each["ego_speed"] * _walked_metres(reach, each["hit"], width) / each["walking_speed"]
+        + _BEYOND
+        for each in sets
+    )
 
     def place(stretch: LaneStretch) -> TemplateScene:
         near = near_side(site, stretch)
@@ -90,10 +111,19 @@ def _crossing_scene(
         crossing = site.sides.crossing(stretch, along, near=near, beyond=beyond)
         if crossing.metres > reach:
             raise UnfitPlaceError(f"are more than {reach:.0f} m from the sidewalk")
+        if min(_walked_metres(crossing.metres, each["hit"], width) for each in sets) < _FIRST_STEP:
+            raise UnfitPlaceError("are so near to the sidewalk that the ego would be past first")
         # Its centre is to be at this share of the ego's width, from the side that it comes from.
-        walked = crossing.metres - (0.5 - values["hit"]) * site.usable.bodies[Category.CAR].width
-        distance = speed * walked / walking
-        start = node_near(site, stretch, crossing.along - distance - lead_in)
+        distance = speed * _walked_metres(crossing.metres, values["hit"], width) / walking
+        farthest = max(
+            each["ego_speed"]
+            * (
+                _walked_metres(crossing.metres, each["hit"], width) / each["walking_speed"]
+                + each["approach"]
+            )
+            for each in sets
+        )
+        start = node_near(site, stretch, crossing.along - farthest - half)
         ego = vehicle(site, "ego", start, int(stretch.nodes[-1]), speed=speed, ego=True)
         actors = [ego, pedestrian(walker, crossing)]
         rules = [at_once("wait", walker, {"stop": {}})]
@@ -104,17 +134,30 @@ def _crossing_scene(
             seen = " It is hidden by a vehicle stopped in the lane at the kerb."
         elif hidden is _HiddenBy.AT_KERB:
             at = crossing.along - values["clearance"]
-            parked, pose = _at_kerb(site, stretch, at, near)
+            parked, pose = _park_at_kerb(site, stretch, at, near)
             actors.append(parked)
             stays = [[0.0, *pose], [_FOR_EVER, *pose]]
             rules.append(at_once("parked", "parked", {"replay": {"rows": stays}}))
             seen = " It is hidden by a vehicle parked beside the lane."
         rules.append(_crossing_rule(walker, crossing, distance, walking))
-        duration = values["approach"] + crossing.metres / walking + 20.0
+        duration = max(
+            each["approach"] + crossing.metres / each["walking_speed"] + 20.0 for each in sets
+        )
+        if len(sets) > 1:
+            duration += farthest / min(each["ego_speed"] for each in sets)
+        walks = f"{crossing.metres - width / 2.0:.4f} + {width:.4f} * $hit"
         return TemplateScene(
             actors=tuple(actors),
             rules=tuple(rules),
             duration=math.ceil(duration),
+            formulas={
+                ("actors", "ego", "speed"): "$ego_speed",
+                ("actors", "ego", "initial_speed"): "$ego_speed",
+                ("rules", "cross", "when", "all", 1, "distance", "below"): (
+                    f"$ego_speed * ({walks}) / $walking_speed"
+                ),
+                ("rules", "cross", "then", 0, "walk", "speed"): "$walking_speed",
+            },
             wanted=(
                 f"Ego {kmh(speed)}, pedestrian {kmh(walking)}. The pedestrian starts when the "
                 f"ego's front is {distance:.2f} m away, so that both are at the place where "
@@ -128,6 +171,11 @@ def _crossing_scene(
     return first_fit(found, why, place, what=what, map_name=site.region.graph.map_name)
 
 
+def _walked_metres(metres: float, hit: float, width: float) -> float:
+    """Metres that a pedestrian walks from its start until the ego's front is at its path."""
+    return metres - (0.5 - hit) * width
+
+
 def _park_vehicle(site: TemplateSite, lane: LaneStretch, front: float) -> dict[str, Any]:
     """Make a vehicle that stands with its front where is said, or up to a node's spacing before."""
     half = body_length(site, Category.CAR) / 2.0
@@ -139,7 +187,7 @@ def _park_vehicle(site: TemplateSite, lane: LaneStretch, front: float) -> dict[s
     return vehicle(site, "parked", node, last, speed=CHILD, moving=False)
 
 
-def _at_kerb(
+def _park_at_kerb(
     site: TemplateSite, lane: LaneStretch, front: float, near: int
 ) -> tuple[dict[str, Any], list[float]]:
     """Make a vehicle that is parked beside a lane, and the pose of its body's centre."""
@@ -221,8 +269,9 @@ MID_BLOCK = SceneTemplate(
     source="Euro NCAP AEB VRU: walking adult at 5 km/h from the near side, the ego at 10 to "
     "60 km/h, here at 40 or less.",
     needs="a sidewalk on either side of a road, away from crosswalks",
-    parameters=_SPEEDS,
+    parameters=(*_SPEEDS[:-1], _SPEEDS[-1]._replace(low=-4.0, high=10.0)),
     place=_mid_block,
+    place_open=_mid_block_of,
 )
 
 

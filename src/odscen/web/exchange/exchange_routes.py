@@ -142,7 +142,7 @@ def import_files(
     option: Annotated[Sequence[str], Form(description="NAME=VALUE")] = (),
 ) -> JobStarted:
     """Make a scenario of a file of a foreign format, in the background; the result is its name."""
-    options = _given_options(option, ego=ego)
+    options = _parse_options(option, ego=ego)
     sent = [SentFile(file.filename or "file", file.file.read()) for file in files]
 
     def work(progress: ProgressCallback) -> JobResult:
@@ -197,10 +197,12 @@ def export_run(
     run: str, shared: Shared, to: str, version: str | None = None, option: Options = ()
 ) -> Response:
     """Download what happened in a finished run: a ZIP with the map, or one page of HTML."""
-    options = _given_options(option, version=version)
+    options = _parse_options(option, version=version)
     folder = shared.runs.kept.whole(run)
     files = export_to_memory(shared.workspace, folder, to=to, options=options)
-    return _as_download(files, f"{run}.{to}" if to == _PAGE[1:] else f"{run}-as-run.{to}", options)
+    return _make_download(
+        files, f"{run}.{to}" if to == _PAGE[1:] else f"{run}-as-run.{to}", options
+    )
 
 
 @exports.get("/{name}/export/notes")
@@ -208,7 +210,7 @@ def export_notes(
     name: str, shared: Shared, to: str, version: str | None = None, option: Options = ()
 ) -> ExportInfo:
     """What an export would hold, and what its format cannot say; refused if it cannot be made."""
-    files = _export_scenario(shared, name, to, _given_options(option, version=version))
+    files = _export_scenario(shared, name, to, _parse_options(option, version=version))
     notes = files.notes() or {"approximated": [], "left_out": []}
     return ExportInfo(files=list(files.contents), **notes)
 
@@ -218,11 +220,11 @@ def export_scenario(
     name: str, shared: Shared, to: str, version: str | None = None, option: Options = ()
 ) -> Response:
     """Download a scenario in another format, as a ZIP with all that it needs."""
-    options = _given_options(option, version=version)
-    return _as_download(_export_scenario(shared, name, to, options), f"{name}.{to}", options)
+    options = _parse_options(option, version=version)
+    return _make_download(_export_scenario(shared, name, to, options), f"{name}.{to}", options)
 
 
-def _given_options(settings: Sequence[str], **others: str | None) -> dict[str, str]:
+def _parse_options(settings: Sequence[str], **others: str | None) -> dict[str, str]:
     """Options by name, of ``NAME=VALUE`` and of those that have a parameter of their own."""
     options = {name: value for name, value in others.items() if value is not None}
     for setting in settings:
@@ -240,7 +242,7 @@ def _export_scenario(
     return export_to_memory(shared.workspace, scenario, name=name, to=to, options=options)
 
 
-def _as_download(files: ExportedFiles, name: str, options: Mapping[str, str]) -> Response:
+def _make_download(files: ExportedFiles, name: str, options: Mapping[str, str]) -> Response:
     file = "-".join([name, *options.values()])
     plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", file)
     content, kind, suffix = files.zipped(), "application/zip", ".zip"

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import logging
+import os
 import shutil
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
-from fastapi import APIRouter, File, Form, Query, UploadFile
+from fastapi import APIRouter, Query
 from pydantic import Field
+from starlette.requests import Request
 from starlette.responses import Response
 
 from odscen.app.exchange.kept_recordings import (
-    SentPath,
+    SEARCHED_AT_ONCE,
     add_recording,
     fitting_maps_of,
     open_recording,
@@ -21,15 +25,18 @@ from odscen.app.exchange.kept_recordings import (
     recording_names,
     remove_recording,
     scenario_of_recording,
+    search_recording,
 )
-from odscen.base.atomic_folders import scratch_folder
+from odscen.base.atomic_folders import passing_folder
 from odscen.base.categories import Category
-from odscen.base.errors import DamagedError
+from odscen.base.errors import DamagedError, InputError, ResourceError
+from odscen.base.system_errors import disk_errors
 from odscen.formats.tracks.scenario_of_tracks import SceneChoice
 from odscen.web.exchange.exchange_routes import IMPORT_REPORT
+from odscen.web.exchange.received_files import receive_files
 from odscen.web.jobs import JobResult
 from odscen.web.messages import Answer, JobStarted, Name, RequestBody
-from odscen.web.services import Shared
+from odscen.web.services import Services, Shared
 from odscen.web.wire.media_types import SVG, answers
 
 if TYPE_CHECKING:
@@ -37,9 +44,13 @@ if TYPE_CHECKING:
     from odscen.maps.store import ProgressCallback
 
 _MOST_ROWS = 1_000_000
+_ROOM: Final = 3
+"""Bytes on the disk for each byte that is sent: the file itself, its copy in parts, its tracks."""
 _GHOSTS = "ghosts.json"
 
-SceneKind = Literal["hard_braking", "short_ttc", "lane_change", "cut_in", "crossing_pedestrian"]
+SceneKind = Literal[
+    "hard_braking", "short_ttc", "lane_change", "cut_in", "crossing_pedestrian", "unprotected_left"
+]
 Second = Annotated[float, Field(ge=-1e10, le=1e10, allow_inf_nan=False)]
 
 
@@ -103,10 +114,12 @@ class RecordingInfo(RecordingRow):
 
     ``published_schema`` is that of its file; ``offset`` metres and degrees to the frame of the map;
     ``added`` maps that came with it; ``unused`` files that were sent with it and not needed.
-    ``origin`` is added to places of moments, ``bounds`` are those of the tracks, metres.
+    ``origin`` is added to places of moments, ``bounds`` are those of the tracks, metres. Until it
+    has been ``searched`` there are no scenes, and nothing is known of how it lies on its map.
     """
 
     published_schema: str
+    searched: bool
     step: float
     notes: list[str]
     added: list[str]
@@ -180,38 +193,98 @@ def list_recordings(shared: Shared) -> list[RecordingRow]:
     return rows
 
 
-@router.post("", status_code=202)
-def add_sent_recording(
-    shared: Shared,
-    files: Annotated[
-        list[UploadFile],
-        File(description="A recording, the files that belong to it, and if need be its map."),
-    ],
-    on_map: Annotated[str | None, Form(alias="map", max_length=64)] = None,
-) -> JobStarted:
-    """Keep a recording, in the background; the result is its name."""
+_FORM = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "required": ["files"],
+                    "properties": {
+                        "files": {
+                            "type": "array",
+                            "items": {
+                                "type": "string",
+                                "contentMediaType": "application/octet-stream",
+                            },
+                        },
+                        "map": {"type": "string"},
+                    },
+                }
+            }
+        },
+    }
+}
+
+
+@router.post("", status_code=202, openapi_extra=_FORM)
+async def add_sent_recording(request: Request, shared: Shared) -> JobStarted:
+    """Keep a recording, in the background; the result is its name.
+
+    The scenes of a large one are looked for when it is there.
+    """
     with ExitStack() as opened:
-        folder = opened.enter_context(scratch_folder())
-        sent = []
-        for row, file in enumerate(files):
-            path = folder / f"sent-{row}"
-            with path.open("wb") as out:
-                shutil.copyfileobj(file.file, out)
-            sent.append(SentPath(file.filename or "file", path))
+        with disk_errors("recordings"):
+            shared.workspace.recordings.mkdir(parents=True, exist_ok=True)
+            folder = opened.enter_context(passing_folder(shared.workspace.recordings))
+            _check_room(request, folder)
+            sent, fields = await receive_files(request, folder)
+        if not sent:
+            raise InputError("no files were sent")
         kept = opened.pop_all()
 
     def work(progress: ProgressCallback) -> JobResult:
         with kept:
             progress("starting", 0.0)
-            added = add_recording(shared.workspace, sent, on_map=on_map, progress=progress)
-            return JobResult(added.name)
+            size = sum(sent_file.path.stat().st_size for sent_file in sent)
+            added = add_recording(
+                shared.workspace,
+                sent,
+                on_map=fields.get("map"),
+                search=size <= SEARCHED_AT_ONCE,
+                progress=progress,
+            )
+        if not added.is_searched:
+            _search_later(shared, added.name)
+        return JobResult(added.name)
 
     try:
-        subject = f"the recording {', '.join(sorted(one.name for one in sent))}"
+        subject = f"the recording {', '.join(sorted(sent_file.name for sent_file in sent))}"
         return JobStarted(job=shared.jobs.start(work, subject=subject))
     except BaseException:
         kept.close()
         raise
+
+
+def _check_room(request: Request, folder: Path) -> None:
+    """Refuse what the disk has no room for before it comes: the files, and tracks made of them."""
+    length = request.headers.get("content-length", "")
+    needed = _ROOM * int(length) if length.isdigit() else 0
+    free = shutil.disk_usage(folder).free
+    if needed > free:
+        raise ResourceError(
+            f"recordings: {needed >> 20:,} MiB are needed for it, and the disk has {free >> 20:,} "
+            "MiB; free some room"
+        ) from OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@router.post("/{name}/search", status_code=202)
+def search_scenes(name: str, shared: Shared) -> JobStarted:
+    """Look for the scenes of a recording, in the background; the job that does so, if one does."""
+    open_recording(shared.workspace, name)
+    return JobStarted(job=_search_later(shared, name))
+
+
+def _search_later(shared: Services, name: str) -> str:
+    def work(progress: ProgressCallback) -> JobResult:
+        return JobResult(search_recording(shared.workspace, name, progress=progress).name)
+
+    return shared.jobs.start(work, subject=_subject_of(name), join=True)
+
+
+def _subject_of(name: str) -> str:
+    return f"recording {name!r}"
 
 
 @router.get("/{name}")
@@ -220,10 +293,11 @@ def show_recording(name: str, shared: Shared) -> RecordingInfo:
     kept = open_recording(shared.workspace, name)
     about = kept.about
     agreement = about["agreement"] or {}
-    often = about["exposure"]
+    often = about["exposure"] or {"hours": 0.0, "vehicle_km": 0.0, "scenes": {}}
     return RecordingInfo(
         **_row_of(kept).model_dump(),
         published_schema=about["schema"],
+        searched=kept.is_searched,
         step=about["summary"]["step"],
         notes=about["summary"]["notes"],
         added=about["added"],
@@ -270,7 +344,7 @@ def set_recording_map(name: str, place: RecordingPlace, shared: Shared) -> JobSt
         )
         return JobResult(kept.name)
 
-    return JobStarted(job=shared.jobs.start(work, subject=f"recording {name!r}"))
+    return JobStarted(job=shared.jobs.start(work, subject=_subject_of(name)))
 
 
 @router.get("/{name}/picture", response_class=Response, responses=SVG)
