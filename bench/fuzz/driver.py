@@ -15,7 +15,7 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -172,7 +172,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         if options.seed is not None:
             tried = [_one(bench, name, options.seed) for name in chosen]
         else:
-            tried = _many(bench, chosen, options, begin)
+            tried = _many(bench, _turns(bench, chosen, options, begin), options.first, begin)
     finally:
         bench.close()
     print(table(tried, time.perf_counter() - begin))
@@ -185,6 +185,9 @@ def main(argv: Sequence[str] | None = None) -> None:
 def _options(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m bench fuzz")
     parser.add_argument("--minutes", type=float, default=MINUTES, help="of trials")
+    parser.add_argument(
+        "--rounds", type=int, help="turns of each target, the same trials on any machine"
+    )
     parser.add_argument("--targets", type=lambda text: text.split(","), metavar="NAME,...")
     parser.add_argument("--first", type=int, default=1, help="seed of the first trials")
     parser.add_argument("--seed", type=int, help="one trial of each target, and keep its folder")
@@ -202,39 +205,58 @@ def _one(bench: Bench, target: str, seed: int) -> Tried:
     return tried
 
 
-def _many(
+def _turns(
     bench: Bench, chosen: Sequence[str], options: argparse.Namespace, begin: float
-) -> list[Tried]:
-    """Trials until the time is up: always of the target that has had least of its share."""
+) -> Iterator[str]:
+    """Targets, each as often as asked, or until the time is up by their shares of it."""
+    if options.rounds is not None:
+        for _ in range(options.rounds):
+            yield from chosen
+        return
     spent = dict.fromkeys(chosen, 0.0)
-    seeds = dict.fromkeys(chosen, options.first)
-    tried: list[Tried] = []
-    turns: Counter[str] = Counter()
-    told = begin
     while time.perf_counter() - begin < options.minutes * 60.0:
         target = min(chosen, key=lambda name: (spent[name] / bench.targets[name][1], name))
         start = time.perf_counter()
+        yield target
+        spent[target] += time.perf_counter() - start
+
+
+def _many(bench: Bench, targets: Iterable[str], first: int, begin: float) -> list[Tried]:
+    """Trials of targets, turn by turn; seeds count up from ``first``."""
+    seeds: dict[str, int] = {}
+    tried: list[Tried] = []
+    turns: Counter[str] = Counter()
+    told = begin
+    for target in targets:
         turns[target] += 1
+        seed = seeds.get(target, first)
         if target in BATCHED and turns[target] % ALONE:
-            mine = range(seeds[target], seeds[target] + BATCH)
+            mine = range(seed, seed + BATCH)
             found = bench.attempt_batch(target, mine)
         else:
-            mine = range(seeds[target], seeds[target] + 1)
-            found = [bench.attempt(target, seeds[target])]
-        spent[target] += time.perf_counter() - start
+            mine = range(seed, seed + 1)
+            found = [bench.attempt(target, seed)]
         seeds[target] = mine.stop
         tried += found
-        for one in found:
-            if one.finding.verdict.failed:
-                print(
-                    f"{one.finding.verdict} --target {target!r} --seed {one.seed}: {one.kind}: "
-                    f"{one.finding.words}".encode("utf-8", "backslashreplace").decode(),
-                    flush=True,
-                )
+        for failure in _failures(found):
+            print(failure, flush=True)
         if time.perf_counter() - told > PROGRESS:
             told = time.perf_counter()
             print(f"{(told - begin) / 60.0:.0f} minutes: {len(tried):,} trials", flush=True)
     return tried
+
+
+def _failures(tried: Sequence[Tried]) -> list[str]:
+    return [
+        (
+            f"{one.finding.verdict} --target {one.target!r} --seed {one.seed}: {one.kind}: "
+            f"{one.finding.words}"
+        )
+        .encode("utf-8", "backslashreplace")
+        .decode()
+        for one in tried
+        if one.finding.verdict.failed
+    ]
 
 
 def table(tried: Sequence[Tried], seconds: float) -> str:
@@ -267,6 +289,7 @@ def table(tried: Sequence[Tried], seconds: float) -> str:
     skipped = {one.finding.words for one in tried if one.finding.verdict is Verdict.SKIPPED}
     lines += [f"skipped: {words}" for words in sorted(skipped)]
     if verdicts:
+        lines += _failures(tried)  # once more: of a long log often the end only is kept
         lines.append(f"folders of the failures: {os.path.relpath(KEPT)}")
     return "\n".join(lines)
 

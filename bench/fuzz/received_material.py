@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import pickle
 import struct
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 
+from tests.formats.tracks.test_scenario_descriptions import waymo_scenario
 from tests.formats.tracks.test_track_readers import (
     COMMONROAD,
     HIGHD,
@@ -65,8 +67,11 @@ def _write_recordings(root: Path) -> None:
         (root / schema).mkdir(parents=True)
         for name, text in files.items():
             (root / schema / name).write_text(text, encoding="utf-8")
-    for schema in ("parquet", "argoverse", "osi", "mcap"):
+    for schema in ("parquet", "argoverse", "osi", "mcap", "scenarionet"):
         (root / schema).mkdir()
+    for protocol in (2, 4, 5):
+        content = pickle.dumps(waymo_scenario(), protocol=protocol)
+        (root / "scenarionet" / f"sd_waymo_{protocol}.pkl").write_bytes(content)
     rows.write_parquet(root / "parquet" / "crossing.parquet")
     rows.select(
         pl.col("id").alias("track_id"),

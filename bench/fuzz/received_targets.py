@@ -87,7 +87,7 @@ def changes_of_recording(name: str) -> dict[str, Change]:
     """What can happen to a file of a recording."""
     if name.endswith(".parquet"):
         return {**RAW, **{f"column {n}": _parquet_column for n in range(8)}}
-    if name.endswith((".osi", ".mcap")):
+    if name.endswith((".osi", ".mcap", ".pkl")):
         return {**RAW, **{f"doubles {n}": _double for n in range(4)}}
     return XML if name.endswith(".xml") else CSV
 

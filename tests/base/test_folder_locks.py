@@ -48,6 +48,15 @@ def test_a_lock_is_gone_when_it_is_given_back(tmp_path):
     assert not is_locked(tmp_path / "x")
 
 
+def test_a_parent_that_was_made_stays_if_something_came_into_it(tmp_path):
+    with locked(tmp_path / "runs" / "mine" / "x", what="run"):
+        (tmp_path / "runs" / "kept").touch()
+    assert [path.name for path in tmp_path.rglob("*")] == ["runs", "kept"]
+    with locked(tmp_path / "runs" / "x", what="run"), locked(tmp_path / "runs" / "y", what="run"):
+        pass
+    assert (tmp_path / "runs").is_dir()
+
+
 @pytest.mark.slow
 def test_a_folder_that_is_about_to_be_free_is_waited_for(tmp_path):
     # A process that the holder has started outlives it for a moment, with the lock.

@@ -11,7 +11,6 @@ import signal
 import sys
 import threading
 from _thread import interrupt_main
-from importlib.abc import MetaPathFinder
 from typing import TYPE_CHECKING
 
 from odscen.base.errors import OdscenError, ResourceError
@@ -81,7 +80,7 @@ def _open_closed_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-class _AddressSpaceCheck(MetaPathFinder):
+class _AddressSpaceCheck:
     """Refuses tables where too little address space is allowed: Polars would abort the process.
 
     It reserves addresses for its threads and its allocator, far more than the memory it uses.
@@ -101,7 +100,21 @@ class _AddressSpaceCheck(MetaPathFinder):
 
 
 def main() -> None:
-    """Entry point: runs the command and turns errors into messages and exit codes.
+    """Entry point: carries the command out, here or by a process that has done the imports."""
+    if os.environ.get("ODSCEN_RESIDENT"):
+        _open_closed_streams()  # what is handed over must be streams
+        from odscen.cli.resident.client import carry_out_there
+
+        try:
+            carry_out_there(sys.argv[1:])
+        except OdscenError as error:
+            _report_to_console(error)
+            sys.exit(error.exit_code)
+    carry_out()
+
+
+def carry_out() -> None:
+    """Carry the command out here, and turn errors into messages and exit codes.
 
     Errors are odscen's own, and those of the system that nobody has given a place.
     """
@@ -132,11 +145,11 @@ def main() -> None:
         sys.exit(ResourceError.exit_code)
     except SystemExit as stop:
         # Typer has told people what is wrong with the call; scripts want it as JSON too.
-        told = getattr(stop.__context__, "format_message", None)
-        if told is not None:
+        format_message = getattr(stop.__context__, "format_message", None)
+        if format_message is not None:
             from odscen.cli.console import report_usage
 
-            report_usage(told())
+            report_usage(format_message())
         raise
 
 

@@ -96,13 +96,13 @@ def command_line(given: Sequence[str] | None = None) -> typer.Typer:
     for name in _GROUPS:
         if not known or name == asked:
             app.add_typer(
-                _named_only(_build_group(name)) if listed else _build_group(name), name=name
+                _keep_help_only(_build_group(name)) if listed else _build_group(name), name=name
             )
     for name, place in _COMMANDS.items():
         if not known or name == asked:
             function = _import_command(place)
             kind = _import_command(_CLASSES[name]) if name in _CLASSES else None
-            app.command(name, cls=kind)(_without_parameters(function) if listed else function)
+            app.command(name, cls=kind)(_drop_parameters(function) if listed else function)
     return app
 
 
@@ -116,11 +116,11 @@ def _build_group(name: str) -> typer.Typer:
     return group
 
 
-def _named_only(group: typer.Typer) -> typer.Typer:
+def _keep_help_only(group: typer.Typer) -> typer.Typer:
     return typer.Typer(help=group.info.help)
 
 
-def _without_parameters(function: Callable[..., Any]) -> Callable[[], None]:
+def _drop_parameters(function: Callable[..., Any]) -> Callable[[], None]:
     def listed() -> None:
         pass
 

@@ -109,7 +109,7 @@ _MOST_SEEDS = 1000
 
 def _parse_seeds(text: str) -> tuple[int, ...]:
     """Read ``10`` (1 to 10), ``1,2,7`` or ``101-150``."""
-    found: list[int] = []
+    seeds: list[int] = []
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,10})(?:-(\d{1,10}))?\s*", part)
         if match is None:
@@ -117,14 +117,14 @@ def _parse_seeds(text: str) -> tuple[int, ...]:
                 f"{text!r} are no seeds; write for example 10 (for 1 to 10), 1,2,7 or 101-150"
             )
         first = int(match[1])
-        found += range(first, min(int(match[2] or first), first + _MOST_SEEDS) + 1)
-    if len(found) == 1 and text.strip().isdecimal():
-        found = list(range(1, min(found[0], _MOST_SEEDS + 1) + 1))
-    if not 0 < len(found) <= _MOST_SEEDS or max(found) >= 2**31:
+        seeds += range(first, min(int(match[2] or first), first + _MOST_SEEDS) + 1)
+    if len(seeds) == 1 and text.strip().isdecimal():
+        seeds = list(range(1, min(seeds[0], _MOST_SEEDS + 1) + 1))
+    if not 0 < len(seeds) <= _MOST_SEEDS or max(seeds) >= 2**31:
         raise typer.BadParameter(
             f"{text!r}: at least 1 and at most {_MOST_SEEDS} seeds, below 2^31"
         )
-    return tuple(dict.fromkeys(found))
+    return tuple(dict.fromkeys(seeds))
 
 
 def duration(text: str) -> float:
@@ -141,14 +141,14 @@ def duration(text: str) -> float:
         raise typer.BadParameter(str(error)) from error
 
 
-def _from_the_start(text: str) -> float:
+def _parse_warm_up(text: str) -> float:
     return 0.0 if text.strip() in ("0", "none") else duration(text)
 
 
 WarmUpOption = Annotated[
     float | None,
     typer.Option(
-        parser=_from_the_start,
+        parser=_parse_warm_up,
         metavar="TIME",
         help="Leave this much from the start out of all figures: 10min. (default: the scenario's)",
     ),

@@ -36,15 +36,15 @@ def fit(
     from odscen.app.demand import demands
     from odscen.maps.store import Workspace
 
-    found = demands.fit_counts(Workspace.open(workspace), what)
+    fit_report = demands.fit_counts(Workspace.open(workspace), what)
     if page is not None:
         from odscen.app.demand.demand_correction import write_fit_page
 
-        log(f"Wrote {write_fit_page([('Counts and traffic', found)], page, title=what.stem)}")
+        log(f"Wrote {write_fit_page([('Counts and traffic', fit_report)], page, title=what.stem)}")
     if as_json:
-        print_json({"file": str(what), **found.to_dict()})
+        print_json({"file": str(what), **fit_report.to_dict()})
         return
-    show_fit(found, every=every)
+    show_fit(fit_report, every=every)
 
 
 def routes(
@@ -153,26 +153,27 @@ def correct(
     from odscen.maps.store import Workspace
 
     document = scenarios.read_scenario(scenario)
-    found = demand_correction.correct_matrix(
+    correction = demand_correction.correct_matrix(
         Workspace.open(workspace),
         document,
         trust=trust,
         rounds=rounds,
         iterated=lambda step: log(step.words),
     )
-    path = scenarios.write_scenario(found.scenario, out or scenario)
+    path = scenarios.write_scenario(correction.scenario, out or scenario)
     if page is not None:
-        fits = [("Prior matrix", found.before), ("Corrected matrix", found.after)]
+        fits = [("Prior matrix", correction.before), ("Corrected matrix", correction.after)]
         log(f"Wrote {demand_correction.write_fit_page(fits, page, title=document.name)}")
     if as_json:
-        trips = {"trips_before": found.trips_before, "trips_after": found.trips_after}
-        fits_json = {"before": found.before.to_dict(), "after": found.after.to_dict()}
+        trips = {"trips_before": correction.trips_before, "trips_after": correction.trips_after}
+        fits_json = {"before": correction.before.to_dict(), "after": correction.after.to_dict()}
         print_json({"file": str(path), **trips, **fits_json})
         return
-    show_fit(found.after, every=False)
+    show_fit(correction.after, every=False)
     log(
-        f"{found.trips_before:,.0f} trips became {found.trips_after:,.0f}; counts within GEH 5: "
-        f"{found.before.share_met or 0:.1%} before, {found.after.share_met or 0:.1%} now"
+        f"{correction.trips_before:,.0f} trips became {correction.trips_after:,.0f}; "
+        f"counts within GEH 5: {correction.before.share_met or 0:.1%} before, "
+        f"{correction.after.share_met or 0:.1%} now"
     )
     log(f"Wrote {path}")
 

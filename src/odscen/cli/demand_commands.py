@@ -193,15 +193,15 @@ _SHOWN_ROWS = 12
 
 
 def _parse_columns(text: str | None) -> dict[str, str]:
-    found = {}
+    columns_by_role = {}
     for part in (text or "").split(","):
         if not part.strip():
             continue
         role, equals, title = part.partition("=")
         if not equals or not title.strip():
             raise InputError(f"columns are written as station=TITLE,time=TITLE, not {text!r}")
-        found[role.strip()] = title.strip()
-    return found
+        columns_by_role[role.strip()] = title.strip()
+    return columns_by_role
 
 
 def _print_traffic(file: Path, report: TrafficReport) -> None:
@@ -362,9 +362,9 @@ def list_entries(
 
     document = scenarios.read_scenario(scenario)
     graph = maps.map_of(Workspace.open(workspace), document).sumo.graph
-    found = demands.find_entries(document, graph)
+    entries = demands.find_entries(document, graph)
     rows = [
-        (entry.segment, entry.direction, [lane.lane for lane in entry.lanes]) for entry in found
+        (entry.segment, entry.direction, [lane.lane for lane in entry.lanes]) for entry in entries
     ]
     if as_json:
         keys = ("segment", "direction", "lanes")
@@ -468,14 +468,14 @@ def parse_shares(text: str, *, example: str) -> dict[str, float]:
     InputError
         If it is not written so.
     """
-    found: dict[str, float] = {}
+    shares: dict[str, float] = {}
     for part in text.split(","):
         name, _, share = part.strip().partition("=")
         try:
-            found[name.strip()] = float(share or "1")
+            shares[name.strip()] = float(share or "1")
         except ValueError:
             raise InputError(f"shares are written as {example}, not {text!r}") from None
-    return found
+    return shares
 
 
 def _split_rates(text: str) -> tuple[float, ...]:

@@ -38,15 +38,15 @@ def diff_maps(
     from odscen.base.text_files import write_text
     from odscen.maps.store import Workspace
 
-    found = compare_maps(Workspace.open(workspace), before, after)
+    comparison = compare_maps(Workspace.open(workspace), before, after)
     if svg is not None:
-        write_text(svg, found.to_svg())
+        write_text(svg, comparison.to_svg())
         log(f"Wrote {svg}")
     if as_json:
-        print_json(found.to_dict())
+        print_json(comparison.to_dict())
     else:
-        _print_differences(found.changes)
-    _exit_with_code(found.changes, exit_code=exit_code)
+        _print_differences(comparison.changes)
+    _exit_with_code(comparison.changes, exit_code=exit_code)
 
 
 def diff_scenarios(
@@ -60,18 +60,18 @@ def diff_scenarios(
     """Say what differs between two scenarios, field by field."""
     from odscen.app.differences import compare_scenarios
 
-    found = compare_scenarios(before, after)
+    comparison = compare_scenarios(before, after)
     if as_json:
         print_json(
             {
                 "before": str(before),
                 "after": str(after),
-                "changes": [difference.to_dict() for difference in found],
+                "changes": [difference.to_dict() for difference in comparison],
             }
         )
     else:
-        _print_differences(found)
-    _exit_with_code(found, exit_code=exit_code)
+        _print_differences(comparison)
+    _exit_with_code(comparison, exit_code=exit_code)
 
 
 def _print_differences(found: Sequence[MapChange] | Sequence[ScenarioChange]) -> None:

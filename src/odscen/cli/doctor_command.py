@@ -74,16 +74,16 @@ def doctor(
         if checks[-1]["found"] is None
         else _examine_workspace(workspace, runs or [], repair=repair)
     )
-    told = []
+    findings = []
     for step in steps:
-        told.append(step.to_dict())
+        findings.append(step.to_dict())
         if step.harm:
             healthy = False
         if not as_json:
             place = f" -> {step.place}" if step.place else ""
             log(f"{step.what} {step.name}: {step.action}: {step.words}{place}")
     if as_json:
-        print_json({"healthy": healthy, "checks": checks, "stored": told})
+        print_json({"healthy": healthy, "checks": checks, "stored": findings})
     raise typer.Exit(0 if healthy else 2)
 
 
@@ -104,10 +104,10 @@ def _check_package(name: str, *, needed: bool, advice: str) -> dict[str, Any]:
     from importlib.metadata import PackageNotFoundError, version
 
     try:
-        found = version(name)
+        installed = version(name)
     except PackageNotFoundError:
-        found = None
-    return _check_row(name, found, needed=needed, advice=advice)
+        installed = None
+    return _check_row(name, installed, needed=needed, advice=advice)
 
 
 def _check_sumo() -> dict[str, Any]:

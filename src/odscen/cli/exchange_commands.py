@@ -25,8 +25,16 @@ from odscen.formats import list_formats
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-_READ = {name: one for name, one in list_formats().items() if one.read is not None}
-_WRITTEN = {name: one for name, one in list_formats().items() if one.write is not None}
+_READ = {
+    name: known_format
+    for name, known_format in list_formats().items()
+    if known_format.read is not None
+}
+_WRITTEN = {
+    name: known_format
+    for name, known_format in list_formats().items()
+    if known_format.write is not None
+}
 _LISTED_SUFFIXES = list(dict.fromkeys(end for reader in _READ.values() for end in reader.suffixes))
 
 

@@ -8,14 +8,28 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from odscen.base.errors import InputError
 from odscen.cli.console import JsonOption, WorkspaceOption, log, print_json, print_table, progress
 
 if TYPE_CHECKING:
     from odscen.app.learned.evaluation import TrafficQuality
     from odscen.app.learned.snapshot_data import MadeShard
+    from odscen.formats.tracks.recorded_traffic import RecordedTraffic
 
 DataOption = Annotated[
     Path, typer.Option("--data", help="Folder of: odscen learn data.", metavar="DIR")
+]
+RecordingOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--recording",
+        help="Recorded traffic in place of runs, on the one --map; repeatable.",
+        metavar="FILE",
+    ),
+]
+OffsetOption = Annotated[
+    str,
+    typer.Option(help="Of recordings: metres and degrees to the map.", metavar="X,Y[,DEGREES]"),
 ]
 _COLUMNS = (
     "frechet", "mmd", "jsd_gap", "jsd_speed", "jsd_junction", "jsd_heading", "stopped",
@@ -37,10 +51,12 @@ def data(
     runs: Annotated[int, typer.Option(min=1, help="Of each map.")] = 8,
     seed: Annotated[int, typer.Option(min=0, help="Of the first run.")] = 1,
     until: Annotated[float, typer.Option(help="Seconds of each run.")] = 300.0,
+    recording: RecordingOption = None,
+    offset: OffsetOption = "",
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Run traffic on maps and store snapshots of it, a file for each run.
+    """Run traffic on maps and store snapshots of it, a file for each run; or of recorded traffic.
 
     Runs that gridlock are made again with half the traffic, and in the end left out. Called again,
     it resumes after an interruption.
@@ -53,7 +69,19 @@ def data(
     def done(made: MadeShard) -> None:
         log(f"{made.file.name}: {made.skipped or f'{made.vehicles} vehicles'}")
 
-    made = make_shards(Workspace.open(workspace), maps or [], out, settings=settings, done=done)
+    store = Workspace.open(workspace)
+    if recording:
+        from odscen.app.learned.recorded_data import make_recorded_shard
+
+        (on_map,) = _require_one_map(maps)
+        made = []
+        for name, tracks in _read_recordings(recording, offset).items():
+            made.append(
+                make_recorded_shard(store, on_map, tracks, out, name=name, settings=settings)
+            )
+            done(made[-1])
+    else:
+        made = make_shards(store, maps or [], out, settings=settings, done=done)
     kept = [shard for shard in made if shard.skipped is None]
     log(f"{len(kept)} of {len(made)} runs kept, {sum(shard.vehicles for shard in kept)} vehicles")
     if as_json:
@@ -161,18 +189,27 @@ def driver(
     runs: Annotated[int, typer.Option(min=1, help="Of each map.")] = 3,
     until: Annotated[float, typer.Option(help="Seconds of each run.")] = 200.0,
     seed: Annotated[int, typer.Option(min=0, help="Random seed.")] = 0,
+    recording: RecordingOption = None,
+    offset: OffsetOption = "",
     workspace: WorkspaceOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Learn from SUMO's drivers how to accelerate: weights of the behaviour model imitation."""
+    """Learn from SUMO's drivers, or recorded ones, how to accelerate: weights of imitation.
+
+    Of recordings the first 70 % of the time are learned from, and the error is that of the rest.
+    """
     from odscen.app.learned.learned_driving import learn_driving
     from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
     names = maps or [entry.name for entry in store.maps()]
+    recordings = _read_recordings(recording, offset) if recording else None
+    if recordings:
+        names = _require_one_map(maps)
     found = learn_driving(
-        store, names, out, hold_out=hold_out or (), runs=runs, duration=until, seed=seed, told=log
-    )
+        store, names, out, hold_out=hold_out or (), runs=runs, duration=until, seed=seed,
+        recordings=recordings, told=log,
+    )  # fmt: skip
     log(f"wrote {out}: {out.stat().st_size:,} bytes")
     if as_json:
         print_json({"file": str(out), "maps": [score._asdict() for score in found]})
@@ -183,6 +220,25 @@ def driver(
     ]
     columns = ("map", "accelerations", "off by, m/s2", "if speeds were kept")
     print_table("root mean square error", columns, rows)
+
+
+def _require_one_map(maps: list[str] | None) -> list[str]:
+    if len(maps or []) != 1:
+        raise InputError("name the map that the recordings lie on, once", element="--map")
+    return list(maps or [])
+
+
+def _read_recordings(files: list[Path], offset: str) -> dict[str, RecordedTraffic]:
+    from odscen.app.exchange.recorded_traffic import read_recorded_traffic
+    from odscen.maps.folder_names import name_from_file
+
+    recordings_by_name: dict[str, RecordedTraffic] = {}
+    for file in files:
+        name = name_from_file(file)
+        if name in recordings_by_name:
+            raise InputError(f"two recordings are called {name!r}", element="--recording")
+        recordings_by_name[name] = read_recorded_traffic(file, offset=offset)
+    return recordings_by_name
 
 
 def _quality_rows(found: list[TrafficQuality]) -> list[list[str]]:

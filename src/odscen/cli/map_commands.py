@@ -384,13 +384,13 @@ def export(
     entry = Workspace.open(workspace).map(name)
     if out.suffix.lower() != ".osm":
         raise InputError(f"{out.name} does not end in .osm, as Lanelet2 files do")
-    found = export_lanelet2(parse(entry.read("xodr"), file="map.xodr"), origin=origin)
-    write_file(out, found.osm)
-    for row in found.entries:
+    lanelet_export = export_lanelet2(parse(entry.read("xodr"), file="map.xodr"), origin=origin)
+    write_file(out, lanelet_export.osm)
+    for row in lanelet_export.entries:
         log(f"{row.outcome.value}: {row.element}: {row.reason}")
     log(f"Wrote {out}")
     if as_json:
-        rows = [row.to_dict() for row in found.entries]
+        rows = [row.to_dict() for row in lanelet_export.entries]
         print_json({"name": name, "file": str(out), "entries": rows})
 
 

@@ -88,8 +88,8 @@ def _print_changes(done: BroughtIn, *, as_json: bool) -> None:
             }
         )
         return
-    said = ", ".join(f"{count} x {what}" for what, count in counts.items())
-    log(f"{entry.name}: network {entry.info['network']['source']}; {said or 'no difference'}")
+    listed = ", ".join(f"{count} x {what}" for what, count in counts.items())
+    log(f"{entry.name}: network {entry.info['network']['source']}; {listed or 'no difference'}")
     if changes:
         print_table(
             "", ("what", "element", "detail"), [tuple(change) for change in changes[:_SHOWN]]
@@ -127,13 +127,13 @@ def compare_networks(
         duration=duration,
     )
     with progress(name) as step:
-        found = compare_converters(
+        comparison = compare_converters(
             Workspace.open(workspace), name, settings=settings, processes=jobs, progress=step
         )
     if as_json:
-        print_json(found.to_dict())
+        print_json(comparison.to_dict())
     else:
-        _print_comparison(found)
+        _print_comparison(comparison)
 
 
 def _parse_numbers(option: str, text: str) -> tuple[float, ...]:

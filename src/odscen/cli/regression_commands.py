@@ -142,7 +142,7 @@ def gate(
     if commit is not None and history is None:
         raise typer.BadParameter("it goes with --history", param_hint="--commit")
     # Asked before anything runs, so that a run of an hour does not end with an error.
-    known = None if history is None else _known_commit(commit, suite)
+    known = None if history is None else _find_commit(commit, suite)
     if seeds is not None:
         read = read.with_seeds(seeds)
     if shard is not None:
@@ -171,7 +171,7 @@ def gate(
     raise typer.Exit(result.exit_code)
 
 
-def _known_commit(commit: str | None, suite: Path) -> tuple[str, str]:
+def _find_commit(commit: str | None, suite: Path) -> tuple[str, str]:
     from odscen.experiments.history import current_commit
 
     return (commit, "") if commit is not None else current_commit(suite.resolve().parent)

@@ -234,10 +234,10 @@ def log_measures(
     from odscen.app.signals.controller_logs import controller_measures
     from odscen.base.text_files import write_text
 
-    found = controller_measures(file, detectors, minutes=minutes)
+    measures = controller_measures(file, detectors, minutes=minutes)
     if as_json:
-        print_json({name: _rows_as_json(table) for name, table in found.items()})
-    for name, table in found.items():
+        print_json({name: _rows_as_json(table) for name, table in measures.items()})
+    for name, table in measures.items():
         if not as_json and name != "arrivals":
             rows = [[_format_cell(value) for value in row] for row in table.rows()]
             print_table(name.replace("_", " "), table.columns, rows)
@@ -388,7 +388,7 @@ def coordinate(
     from odscen.maps.store import Workspace
 
     store = Workspace.open(workspace)
-    found = coordinate_signals(
+    coordination = coordinate_signals(
         store,
         scenario,
         junctions=_split_list(junctions),
@@ -397,33 +397,35 @@ def coordinate(
         speed=None if speed is None else speed / 3.6,
         cycle=cycle,
     )
-    if not (found.worth_it or anyway):
-        raise InputError(f"{' '.join(found.doubts)} With --anyway it is written all the same")
+    if not (coordination.worth_it or anyway):
+        raise InputError(
+            f"{' '.join(coordination.doubts)} With --anyway it is written all the same"
+        )
     tried = (
-        _evaluate_sides(store, found.scenario, today=scenario, seeds=seeds, jobs=jobs)
+        _evaluate_sides(store, coordination.scenario, today=scenario, seeds=seeds, jobs=jobs)
         if trial
         else None
     )
     _refuse_worse(tried, anyway=anyway)
-    path = scenarios.write_scenario(found.scenario, out or scenario)
+    path = scenarios.write_scenario(coordination.scenario, out or scenario)
     if svg is not None:
-        write_text(svg, found.to_svg())
+        write_text(svg, coordination.to_svg())
     if as_json:
         drawn = {} if svg is None else {"svg": str(svg)}
         more = {} if tried is None else {"evaluation": tried.to_dict()}
-        print_json({"scenario": str(path), **drawn, **found.to_dict(), **more})
+        print_json({"scenario": str(path), **drawn, **coordination.to_dict(), **more})
         return
     rows = [
         (", ".join(light.junctions), round(light.metres), light.offset, light.wave.out_time)
-        for light in found.lights
+        for light in coordination.lights
     ]
-    print_table(f"Cycle {found.cycle:g} s", ["junction", "m", "offset, s", "drive, s"], rows)
+    print_table(f"Cycle {coordination.cycle:g} s", ["junction", "m", "offset, s", "drive, s"], rows)
     for name, band, before in zip(
-        ("out", "back"), (found.out, found.back), found.before, strict=True
+        ("out", "back"), (coordination.out, coordination.back), coordination.before, strict=True
     ):
-        share = 100.0 * band.seconds / found.cycle
+        share = 100.0 * band.seconds / coordination.cycle
         log(f"band {name}: {band.seconds:.1f} s, {share:.0f} % of the cycle (was {before:.1f} s)")
-    for words in found.doubts:
+    for words in coordination.doubts:
         log(words)
     if tried is not None:
         log(tried.words)
@@ -451,23 +453,23 @@ def evaluate(
     """
     from odscen.maps.store import Workspace
 
-    found = _evaluate_sides(
+    comparison = _evaluate_sides(
         Workspace.open(workspace), scenario, today=today, seeds=seeds, jobs=jobs
     )
     if as_json:
-        print_json(found.to_dict())
+        print_json(comparison.to_dict())
         return
     rows = [
         (
             name,
-            *("-" if value is None else f"{value:,.2f}" for value in (one.a, one.b)),
-            "-" if one.low is None else f"{one.low:+,.2f} to {one.high:+,.2f}",
-            one.finding.value,
+            *("-" if value is None else f"{value:,.2f}" for value in (difference.a, difference.b)),
+            "-" if difference.low is None else f"{difference.low:+,.2f} to {difference.high:+,.2f}",
+            difference.finding.value,
         )
-        for name, one in found.differences.items()
+        for name, difference in comparison.differences.items()
     ]
     print_table("", ["figure", "today", "evaluated", "difference, 95 %", "finding"], rows)
-    log(found.words)
+    log(comparison.words)
 
 
 def _evaluate_sides(

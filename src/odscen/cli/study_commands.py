@@ -191,8 +191,12 @@ def report(
     file = write_study_page(study, figures, out or study / PAGE_FILE)
     if as_json:
         parts = {"means": means, "differences": differences}
-        said = {name: [group.to_dict() for group in groups] for name, groups in parts.items()}
-        print_json({"file": str(file), **said, "sentences": difference_sentences(study, figures)})
+        groups_by_name = {
+            name: [group.to_dict() for group in groups] for name, groups in parts.items()
+        }
+        print_json(
+            {"file": str(file), **groups_by_name, "sentences": difference_sentences(study, figures)}
+        )
         return
     _show_groups("Means", means, figures)
     if differences:

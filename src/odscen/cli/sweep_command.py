@@ -129,7 +129,7 @@ def sweep(
     settings = SweepSettings(tuple(safe or ()), named, own, seed, reports, openscenario, driven)
     folder = out or Path(f"{scenarios.scenario_name(scenario)}-sweep")
     with progress("sweeping") as step:
-        found = run_sweep(
+        results = run_sweep(
             Workspace.open(workspace),
             document,
             planned,
@@ -139,8 +139,8 @@ def sweep(
             tell=log,
             done=lambda ended, count: step(f"{ended} of {count} cases", ended / count),
         )
-    _show_sweep(found, as_json=as_json)
-    raise typer.Exit(3 if "failed" in found.table["status"].to_list() else 0)
+    _show_sweep(results, as_json=as_json)
+    raise typer.Exit(3 if "failed" in results.table["status"].to_list() else 0)
 
 
 def _make_plan(
@@ -170,10 +170,10 @@ def _parameter_bounds(scenario: Scenario) -> tuple[Any, ...]:
     from odscen.scenario.sweeps.sweep_plan import Range
 
     return tuple(
-        Range(name, one.min, one.max)
-        for name, one in scenario.parameters.items()
-        if one.min is not None
-        and one.max is not None
+        Range(name, parameter.min, parameter.max)
+        for name, parameter in scenario.parameters.items()
+        if parameter.min is not None
+        and parameter.max is not None
         and f"parameters/{name}/value" not in scenario.formulas
     )
 
@@ -299,7 +299,7 @@ def search(
     document = scenarios.read_scenario(scenario)
     driven = behaviour_door(behaviour, behaviour_set, behaviour_cmd, behaviour_timeout)
     with progress("searching") as step:
-        found = find(
+        results = find(
             Workspace.open(workspace),
             document,
             tuple(map(axis_from_text, vary or ())) or _parameter_bounds(document),
@@ -309,8 +309,8 @@ def search(
             processes=jobs,
             done=lambda ended, count: step(f"{ended} of {count} cases", ended / count),
         )
-    _show_found(found, as_json=as_json)
-    raise typer.Exit(3 if "failed" in found.table["status"].to_list() else 0)
+    _show_found(results, as_json=as_json)
+    raise typer.Exit(3 if "failed" in results.table["status"].to_list() else 0)
 
 
 def _show_found(found: SearchResult, *, as_json: bool) -> None:

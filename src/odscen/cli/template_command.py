@@ -103,13 +103,13 @@ def _parse_numbers(given: Sequence[str]) -> dict[str, float]:
     InputError
         If one is not written so.
     """
-    found = {}
+    numbers = {}
     for text in given:
         name, equals, number = text.partition("=")
         try:
-            found[name.strip()] = float(number)
+            numbers[name.strip()] = float(number)
         except ValueError:
             equals = ""
         if not equals:
             raise InputError(f"--set wants NAME=NUMBER, such as ego_speed=8, not {text!r}")
-    return found
+    return numbers

@@ -220,7 +220,8 @@ class _Search:
         self._departs = np.array([user.depart for user in self._trips])
         self._real = np.array([real is None or user.id in real for user in self._trips])
         self._known = [
-            KnownRoutes([one], [steps]) for one, steps in zip(self._paths, self._steps, strict=True)
+            KnownRoutes([path], [steps])
+            for path, steps in zip(self._paths, self._steps, strict=True)
         ]
         self._taste = np.array([taste(user.id) for user in self._trips])
         self._wants = np.zeros(len(self._paths), dtype=np.bool_)
@@ -308,15 +309,15 @@ class _Search:
         for index, row in enumerate(rows.tolist()):
             groups[row][self._trips[index].goal][index] = self._trips[index].spawn
         bodies = [DEFAULT_BODY[user.category] for user in self._trips]
-        found = list(self._paths)
+        paths = list(self._paths)
         for row, goals in sorted(groups.items()):
             costs = times.costs[row]
             ways = CostRouter(self._drivable.with_costs(costs), self._lanes, costs)
             for goal, spawns in sorted(goals.items()):
                 for index, path in ways.paths_to(goal, spawns, bodies):
                     if len(path) > 1:
-                        found[index] = path
-        return found
+                        paths[index] = path
+        return paths
 
 
 def _read_outcome(folder: Path, *, vehicles: int) -> tuple[float | None, int, int, int]:

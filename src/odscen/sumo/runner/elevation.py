@@ -186,7 +186,7 @@ def _walk_slopes(lane: NDArray[np.int64], s: FloatArray, z: FloatArray) -> Float
 
 def _lane_heights(graph: MapGraph, table: LaneTable) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Positions along each SUMO lane, ascending, and heights there."""
-    found: dict[str, tuple[FloatArray, FloatArray]] = {}
+    heights: dict[str, tuple[FloatArray, FloatArray]] = {}
     lanes, walks = graph.lanes, graph.walks
     walk_keys = [
         Roadside(*key) if beside else key
@@ -203,5 +203,5 @@ def _lane_heights(graph: MapGraph, table: LaneTable) -> dict[str, tuple[FloatArr
         cuts = np.flatnonzero(np.diff(rows)) + 1
         for part in np.split(order, cuts) if len(order) else ():
             name = table.lane_list[int(places.lane[part[0]])].id
-            found.setdefault(str(name), (places.pos[part], z[part]))
-    return found
+            heights.setdefault(str(name), (places.pos[part], z[part]))
+    return heights

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from odscen.base.errors import ResourceError
+from odscen.base.shell_variables import OF_THE_SHELL
 from odscen.sumo.runner.allocator import fast_allocator
 from odscen.sumo.worker.slice_processes import POSSIBLE
 
@@ -83,12 +84,12 @@ class ForkedWorker:
 class _Server:
     """The process that forks, and the socket to it."""
 
-    def __init__(self, environment: dict[str, str]) -> None:
+    def __init__(self, environment: dict[str, str], *, idle: float | None = None) -> None:
         self.environment = environment
         self._control, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", SERVER],
+                [sys.executable, "-m", SERVER, *([] if idle is None else [str(idle)])],
                 stdin=theirs.fileno(),
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -103,7 +104,7 @@ class _Server:
 
     def suits(self, environment: dict[str, str]) -> bool:
         """Whether what it forks has this environment, but for what polars sets for itself."""
-        names = {*environment, *self.environment} - {SET_BY_POLARS}
+        names = {*environment, *self.environment} - {SET_BY_POLARS, *OF_THE_SHELL}
         return all(environment.get(name) == self.environment.get(name) for name in names)
 
     @property
@@ -137,11 +138,17 @@ def worker_environment() -> dict[str, str]:
     return {**variables, **os.environ}
 
 
-def get_ready() -> None:
-    """Start the process that forks, so that its imports are done while others are."""
+def get_ready(*, idle: float | None = None) -> None:
+    """Start the process that forks, so that its imports are done while others are.
+
+    Parameters
+    ----------
+    idle
+        Wall seconds without a run after which it ends; a minute if not given.
+    """
     if POSSIBLE:
         with _lock:
-            _ready_server()
+            _ready_server(idle)
 
 
 def expect_runs(number: int) -> None:
@@ -170,14 +177,14 @@ def is_ready() -> bool:
         return POSSIBLE and _server is not None and _server.alive
 
 
-def _ready_server() -> _Server:
+def _ready_server(idle: float | None = None) -> _Server:
     global _server  # noqa: PLW0603 - one for all runs of this process
     environment = worker_environment()
     if _server is not None and not (_server.alive and _server.suits(environment)):
         _server.end()
         _server = None
     if _server is None:
-        _server = _Server(environment)
+        _server = _Server(environment, idle=idle)
     return _server
 
 

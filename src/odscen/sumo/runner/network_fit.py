@@ -26,23 +26,23 @@ ASIDE = 0.25
 def place_fit(scenario: Scenario, sumo_map: SumoMap) -> Iterator[Problem]:
     """Yield spawns of actors and flows where the network has no lane, or has it elsewhere."""
     for kind in ("actors", "flows"):
-        for index, one in enumerate(getattr(scenario, kind)):
-            place = place_of(sumo_map.graph, one.spawn)
+        for index, user in enumerate(getattr(scenario, kind)):
+            place = place_of(sumo_map.graph, user.spawn)
             if place is None:
                 continue
             where, aside = f"{kind}[{index}].spawn", _distance_aside(sumo_map, place)
             if np.isnan(aside):
                 message = (
-                    f"{one.id!r} starts on {one.spawn!r}, where the SUMO network of the map has no "
-                    "lane, and will not be inserted; pick another node"
+                    f"{user.id!r} starts on {user.spawn!r}, where the SUMO network of the map has "
+                    "no lane, and will not be inserted; pick another node"
                 )
-                yield warning("no_sumo_lane", where, message, nodes=[one.spawn])
+                yield warning("no_sumo_lane", where, message, nodes=[user.spawn])
             elif aside > ASIDE:
                 message = (
-                    f"{one.id!r} starts on {one.spawn!r}, but SUMO's lane lies {aside:.2f} m "
+                    f"{user.id!r} starts on {user.spawn!r}, but SUMO's lane lies {aside:.2f} m "
                     "beside it, and that is where it is inserted"
                 )
-                yield warning("sumo_lane_aside", where, message, nodes=[one.spawn])
+                yield warning("sumo_lane_aside", where, message, nodes=[user.spawn])
 
 
 def _distance_aside(sumo_map: SumoMap, place: NodePlace) -> float:

@@ -111,8 +111,8 @@ def _with_behaviour(
     """SUMO's files, and what drives or switches lights instead of it."""
     if door is None:
         return files
-    said = {name: value for name, value in asdict(door).items() if value is not None}
-    files = {**files, BEHAVIOUR_FILE: json.dumps(said, indent=2) + "\n"}
+    door_fields = {name: value for name, value in asdict(door).items() if value is not None}
+    files = {**files, BEHAVIOUR_FILE: json.dumps(door_fields, indent=2) + "\n"}
     if not door_switches_lights(door):
         return files
     lights = switched_lights(scenario, sumo_map)

@@ -8,14 +8,17 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+from odscen.records.run_plan import Plan
+from odscen.runs.layout import PLAN_FILE
 from odscen.runs.new_run import SimulationOutcome, claimed_folder, run_in_new_folder
 from odscen.runs.reporter import SILENT
+from odscen.sumo.outputs.output_tables import make_results
 from odscen.sumo.runner.forecast import refuse_without_room
 from odscen.sumo.runner.forked_worker import is_one_of_many, is_ready
-from odscen.sumo.runner.left_results import left_results
 from odscen.sumo.runner.long_runs import run_long
 from odscen.sumo.runner.run_folder import drop_torn_records
 from odscen.sumo.runner.worker_process import run_worker
+from odscen.sumo.worker.recorder import Recorder
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from odscen.runs.reporter import Reporter
     from odscen.sumo.runner.run_folder import SumoPreparedRun
     from odscen.sumo.runner.worker_process import Companion
+    from odscen.sumo.worker.protocol import Left
 
 
 def run_prepared(
@@ -102,3 +106,23 @@ def simulate(
     if outcome.sim_seconds is None:
         drop_torn_records(folder)
     return outcome
+
+
+# --------------------------------------------------------------------------- results of a small run
+# To a process that has just been forked Python is new: whatever it touches is copied first, and the
+# first table costs as much as the simulation. So it simulates, and says what happened; the tables
+# are made here.
+def left_results(folder: Path, left: Left) -> None:
+    """Make what the process would have made: tables, ``events.json`` and ``actors.json``.
+
+    The plan is read as the process reads it, with the digits that the folder has of it.
+
+    Raises
+    ------
+    SimulationError
+        If SUMO has not written its files to their end.
+    """
+    plan = Plan.from_json((folder / PLAN_FILE).read_text(encoding="utf-8"))
+    recorder = Recorder(plan)
+    recorder.take_over(left.recorded)
+    make_results(folder, plan, recorder.events, left.lengths)

@@ -158,9 +158,9 @@ def run_worker(
     if late.is_set():
         words = f"stopped after the time limit of {time_limit:g} s"
         return SimulationOutcome(None, None, seconds, error=words)
-    said = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
+    reason = last.reason if isinstance(last, Failed) else _exit_words(process.returncode)
     words = sumo_words(folder)
-    reason = _with_lack(folder, said, words)
+    reason = _with_lack(folder, reason, words)
     if words:
         reason = f"{reason}\n{words}"
     return SimulationOutcome(None, None, seconds, error=reason)
@@ -252,9 +252,9 @@ def sumo_words(folder: Path, *, lines: int = 12) -> str:
         text = (folder / LOG_FILE).read_text(encoding="utf-8", errors="replace")
     except OSError:
         return ""
-    said = [line.rstrip() for line in text.splitlines() if line.strip()]
-    first = next((i for i, line in enumerate(said) if line.startswith("Error")), None)
-    return "\n".join(said[-lines:] if first is None else said[first : first + lines])
+    last_lines = [line.rstrip() for line in text.splitlines() if line.strip()]
+    first = next((i for i, line in enumerate(last_lines) if line.startswith("Error")), None)
+    return "\n".join(last_lines[-lines:] if first is None else last_lines[first : first + lines])
 
 
 def _kill_after(
@@ -304,16 +304,16 @@ def _kill_process(process: subprocess.Popen[bytes] | ForkedWorker) -> None:
         os.killpg(process.pid, signal.SIGKILL)
 
 
-def _with_lack(folder: Path, said: str, words: str) -> str:
+def _with_lack(folder: Path, reason: str, words: str) -> str:
     """Why a worker has failed; first what the machine had no more of, if that can be told."""
     lack = None
     with suppress(OSError):
         if shutil.disk_usage(folder).free < _NO_ROOM:
             lack = ADVICE[errno.ENOSPC]
     for sign, number in _SIGNS.items():
-        if lack is None and (sign in said or sign in words):
+        if lack is None and (sign in reason or sign in words):
             lack = ADVICE[number]
-    return said if lack is None or lack in said else f"{lack}\n{said}"
+    return reason if lack is None or lack in reason else f"{lack}\n{reason}"
 
 
 _NO_ROOM = 1 << 16
