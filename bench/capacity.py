@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 HOUR = 3600.0
 END = float(os.environ.get("ODSCEN_BENCH_SECONDS", HOUR))
 ONLY_ON = os.environ.get("ODSCEN_BENCH_LIGHTS") == "on"
+CONTROL = os.environ.get("ODSCEN_BENCH_CONTROL", "fixed")
+"""How our lights are run, as a scenario says it."""
 SPACING = 2.0
 FROM_ENDS = 15.0
 NARROWEST = 2.5
@@ -164,7 +166,7 @@ def _bench_of(path: Path, folder: Path, label: str, *, places: Path) -> NetworkB
     import carla
 
     files = {"ours": folder / "ours.net.xml", "netconvert": folder / "peer.net.xml"}
-    build_own(path, files["ours"])
+    build_own(path, files["ours"], control=CONTROL)
     text = path.read_text(encoding="utf-8", errors="replace")
     left = ["--lefthand"] if 'rule="LHT"' in text else []
     run_tool("netconvert", "--opendrive-files", path, "-o", files["netconvert"],
@@ -218,6 +220,7 @@ class NetworkBench:
         import sumolib
 
         self._label, self._folder, self._files = label, folder, dict(files)
+        self._control = signals_of(files["ours"])
         self._waypoints = places
         self.kilometres = len(places) * SPACING / 1000.0
         self._nets = {name: sumolib.net.readNet(str(f)) for name, f in self._files.items()}
@@ -313,6 +316,8 @@ class NetworkBench:
         outcomes = []
         info, stats = self._folder / "info.xml", self._folder / "stats.xml"
         off = ["--tls.all-off"] if lights == "off" else []
+        if name == "ours" and lights != "off" and self._control.exists():
+            off = ["-a", str(self._control)]
         routes = [
             f"{name}.rou.xml",
             *(["walks.xml"] if lights == WALKED and name == "ours" else []),
@@ -372,17 +377,37 @@ def _nearest(net: Any, x: float, y: float, heading: float) -> _Place | None:
     return None
 
 
-def build_own(path: Path, target: Path) -> None:
-    """Write our network of an OpenDRIVE map."""
+def build_own(path: Path, target: Path, *, control: str = "fixed") -> None:
+    """Write our network of an OpenDRIVE map, and how its lights are run with that control."""
     from odscen.convert.building.network import build_network
     from odscen.lanegraph.build_graphs import build_map_graph
     from odscen.opendrive.lanes import RoadTable
     from odscen.opendrive.parse import parse
+    from odscen.scenario.document.signals_document import Signals
+    from odscen.scenario.edits import new_scenario
+    from odscen.sumo.realize.lights.light_realization import realized_lights
+    from odscen.sumo.realize.lights.program_files import signals_xml
+    from odscen.sumo.realize.sumo_map import SumoMap
 
     odr = parse(path.read_bytes(), file=path.name)
     table = RoadTable.of(odr)
     graph = build_map_graph(odr, name=path.stem, sha256="0" * 64, table=table)
-    target.write_bytes(build_network(odr, table, graph.walks).net_xml)
+    network = build_network(odr, table, graph.walks)
+    target.write_bytes(network.net_xml)
+    if control != "fixed":
+        lights = realized_lights(
+            new_scenario(graph, name="control", roi=graph.segments.ids).model_copy(
+                update={"signals": Signals.model_validate({"control": control})}
+            ),
+            SumoMap.of(graph, network.table),
+        )
+        if (text := signals_xml(lights)) is not None:
+            signals_of(target).write_text(text, encoding="utf-8")
+
+
+def signals_of(network: Path) -> Path:
+    """File beside a network with how its lights are run; not there if as the network says."""
+    return network.with_suffix(".signals.add.xml")
 
 
 def run_tool(name: str, *arguments: object) -> None:

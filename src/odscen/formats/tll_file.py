@@ -123,8 +123,8 @@ def _read_program(element: etree._Element) -> FileProgram:
     if kind not in ("static", "actuated"):
         raise InputError(f"{place}: type {kind!r} is not static or actuated")
     phases = tuple(
-        _read_phase(one, f"{place}, phase {number}", actuated=kind == "actuated")
-        for number, one in enumerate(element.iterfind("phase"))
+        _read_phase(phase, f"{place}, phase {number}", actuated=kind == "actuated")
+        for number, phase in enumerate(element.iterfind("phase"))
     )
     if not phases or len({len(phase.state) for phase in phases}) != 1:
         raise InputError(f"{place}: there are no phases, or their states have different lengths")

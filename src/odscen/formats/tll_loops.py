@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from odscen.scenario.signals.light import Light
     from odscen.sumo.realize.road_net import RoadNet
 
-_LEAST = 0.1
+_SHORTEST_LOOP = 0.1
 """Metres of a loop: SUMO's have none if they do not say."""
 
 _NAME = re.compile(r"[^A-Za-z0-9_.-]+")
@@ -32,29 +32,30 @@ class TakenLoop(NamedTuple):
 def taken_loops(loops: Iterable[FileLoop], light: SumoLight, net: RoadNet) -> dict[str, TakenLoop]:
     """Loops for vehicles that lie before the stop lines of a light, by their ids."""
     movements: dict[str, list[int]] = {}
-    for n, link in enumerate(light.links):
-        movements.setdefault(link.source, []).append(n)
-    found = {}
+    for number, link in enumerate(light.links):
+        movements.setdefault(link.source, []).append(number)
+    taken = {}
     for loop in loops:
         if loop.persons or loop.lane not in net.lanes:
             continue
-        way = _way_to_stop_line(loop, movements, net)
-        if way is not None:
-            lane, metres = way
-            length = max(loop.length, _LEAST)
-            found[loop.id] = TakenLoop(
+        stop_line = _find_stop_line(loop, movements, net)
+        if stop_line is not None:
+            lane, metres = stop_line
+            length = max(loop.length, _SHORTEST_LOOP)
+            taken[loop.id] = TakenLoop(
                 lane, tuple(movements[lane]), round(metres, 2), round(length, 2), loop.name
             )
-    return found
+    return taken
 
 
-def _way_to_stop_line(
+def _find_stop_line(
     loop: FileLoop, stop_lines: Mapping[str, object], net: RoadNet
 ) -> tuple[str, float] | None:
     """Lane at the stop line that a loop leads to, and the metres from its front end to there."""
     pos = loop.pos if loop.pos >= 0.0 else net.lanes[loop.lane].length + loop.pos
     todo = [(net.lanes[loop.lane].length - pos - loop.length, loop.lane)]
     seen = {loop.lane}
+    # Nearest lane first, so that of several stop lines the next one is found.
     while todo:
         todo.sort()
         metres, lane = todo.pop(0)
@@ -87,7 +88,7 @@ def taken_detectors(
             own = loop.name or name
             key = (own, approach, loop.before, loop.length, stages, gap)
             together.setdefault(key, []).append(name)
-    found: list[dict[str, Any]] = []
+    detectors: list[dict[str, Any]] = []
     taken: set[str] = set()
     for (own, approach, before, length, stages, gap), names in together.items():
         covered = {n for name in names for n in loops[name].movements}
@@ -101,15 +102,15 @@ def taken_detectors(
         )
         for place in places:
             row = {"before": before, "length": length, "stages": list(stages), "gap": gap}
-            found.append({"id": _fresh_name(own, taken), "at": place, **row})
-    return found
+            detectors.append({"id": _make_unique_name(own, taken), "at": place, **row})
+    return detectors
 
 
-def _fresh_name(name: str, taken: set[str]) -> str:
+def _make_unique_name(name: str, taken: set[str]) -> str:
     plain = _NAME.sub("-", name).strip("-.") or "D"
-    own, number = plain[:60], 1
-    while own in taken:
+    unique, number = plain[:60], 1
+    while unique in taken:
         number += 1
-        own = f"{plain[:56]}-{number}"
-    taken.add(own)
-    return own
+        unique = f"{plain[:56]}-{number}"
+    taken.add(unique)
+    return unique

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
-from odscen.formats.tll_called import called_timing
 from odscen.formats.tll_loops import taken_detectors
 from odscen.formats.tll_stages import (
+    GAP,
+    STAGE_NAME,
     file_stages,
     first_stage_at,
     green_phase,
     joined_steps,
+    main_phases,
     refuse_repeated,
     shown_need,
 )
@@ -110,9 +112,9 @@ class _ProgramTaker:
         return timing, tuple(dict.fromkeys(self._notes))
 
     def _is_actuated(self) -> bool:
-        said = self._plans[0].program.params.get(CONTROL_PARAM)
+        control = self._plans[0].program.params.get(CONTROL_PARAM)
         longer = any(stage.most > stage.least for stages in self._cycles for stage in stages)
-        return longer if said is None else said == "actuated"
+        return longer if control is None else control == "actuated"
 
     def _ended_by(self) -> dict[str, dict[str, float]]:
         """Gaps of the loops that prolong each stage, by the stage's id."""
@@ -141,11 +143,11 @@ class _ProgramTaker:
         if named:
             return named
         columns: dict[tuple[object, ...], list[int]] = {}
-        for n, one in enumerate(self._light.movements):
-            if not one.turn:
+        for n, movement in enumerate(self._light.movements):
+            if not movement.turn:
                 continue
             letters = tuple(phase.state[n].lower() for phase in self._all_phases())
-            key = (one.walk, one.approach, *letters)
+            key = (movement.walk, movement.approach, *letters)
             columns.setdefault(key, []).append(n)
         found = {}
         numbers = {True: 0, False: 0}
@@ -164,7 +166,7 @@ class _ProgramTaker:
             if key.startswith(GROUP_PARAM)
         }
         everything = sorted(n for links in found.values() for n in links)
-        there = [n for n, one in enumerate(self._light.movements) if one.turn]
+        there = [n for n, movement in enumerate(self._light.movements) if movement.turn]
         return found if everything == there else {}
 
     def _designed_groups(self) -> list[dict[str, Any]]:
@@ -289,9 +291,9 @@ class _ProgramTaker:
             for taken, plan, cycle in zip(self._plans, program.plans(), self._cycles, strict=True):
                 refuse_repeated(taken.program.place, cycle, known=len(plan.stages))
                 following = (*plan.stages[1:], plan.stages[0])
-                for one, other, shown in zip(plan.stages, following, cycle, strict=True):
-                    beginning = sorted(beginning_groups(one, other))
-                    for name in sorted(one.groups - other.groups):
+                for stage, other, shown in zip(plan.stages, following, cycle, strict=True):
+                    beginning = sorted(beginning_groups(stage, other))
+                    for name in sorted(stage.groups - other.groups):
                         wanted = shown_need(self._groups[name], shown)
                         changed |= _fit_row(program, rows, name, beginning, wanted)
             if not changed:
@@ -303,12 +305,12 @@ class _ProgramTaker:
         program = DesignedProgram(timing, self._light, "fixed")
         for taken, plan, cycle in zip(self._plans, program.plans(), self._cycles, strict=True):
             following = (*plan.stages[1:], plan.stages[0])
-            for one, other, shown in zip(plan.stages, following, cycle, strict=True):
-                ours = [(shown.seconds, stage_state(program, one))]
-                ours += [(step.seconds, step.state) for step in change_steps(program, one, other)]
+            for stage, other, shown in zip(plan.stages, following, cycle, strict=True):
+                ours = [(shown.seconds, stage_state(program, stage))]
+                ours += [(step.seconds, step.state) for step in change_steps(program, stage, other)]
                 theirs = [(shown.seconds, shown.state)]
                 theirs += [(phase.seconds, phase.state) for phase in joined_steps(shown.steps)]
-                self._compare_states(taken.program, f"after stage {one.id!r}", ours, theirs)
+                self._compare_states(taken.program, f"after stage {stage.id!r}", ours, theirs)
 
     def _compare_states(
         self,
@@ -322,12 +324,12 @@ class _ProgramTaker:
         )
         plain = [[(s, state.lower()) for s, state in rows] for rows in (ours, theirs)]
         if plain[0] != plain[1]:
-            said, made = (
+            shown, made = (
                 ", ".join(f"{seconds:g} s {state}" for seconds, state in rows)
                 for rows in (theirs, ours)
             )
             raise InputError(
-                f"{program.place}: {where} it shows {said}, which stages and intergreens cannot "
+                f"{program.place}: {where} it shows {shown}, which stages and intergreens cannot "
                 f"say; they would give {made}"
             )
         for (_, our), (_, their) in zip(ours, theirs, strict=True):
@@ -343,7 +345,8 @@ class _ProgramTaker:
         """A state whose letters for no connection are red: nobody sees them."""
         movements = self._light.movements
         return "".join(
-            letter if one.turn else "r" for letter, one in zip(state, movements, strict=True)
+            letter if movement.turn else "r"
+            for letter, movement in zip(state, movements, strict=True)
         )
 
 
@@ -396,9 +399,9 @@ def _fit_row(
     if not beginning:
         return False
     if longest > wanted:
-        for one, seconds in needs.items():
+        for later_group, seconds in needs.items():
             if seconds > wanted:
-                rows[name, one] = wanted
+                rows[name, later_group] = wanted
     else:
         meeting = [follower for follower in beginning if program.needed(name, follower)[0]] or list(
             beginning
@@ -437,3 +440,54 @@ def _param_number(params: Mapping[str, str], key: str, default: float) -> float:
     if not 0.0 < value < _LONGEST_PARAM:
         raise ParameterError(f"parameter {key} is {text[:40]!r}, not a number above 0")
     return value
+
+
+# --------------------------------------------------------- programs that call the stages of the map
+def called_timing(
+    light: Light, program: FileProgram, loops: Mapping[str, TakenLoop]
+) -> JunctionTiming:
+    """Timing of a light whose program calls or extends the stages of the map.
+
+    Raises
+    ------
+    InputError
+        If the map has other stages, or the program does not come back to its first phase.
+    """
+    greens, offset, gaps = _read_called_stages(program)
+    if len(greens) != len(light.green):
+        raise InputError(
+            f"{program.place}: it calls {len(greens)} stages of the map, but the light of this map "
+            f"has {len(light.green)}"
+        )
+    own = {name: loop for name, loop in loops.items() if loop.name}
+    extended = program.params.get(CONTROL_PARAM) == "extended"
+    control = "extended" if extended else "actuated"
+    made: dict[str, Any] = {"junction": light.names[0], "control": control, "offset": offset}
+    made |= {"green": list(greens)} if greens != light.green else {}
+    made |= {"detectors": found} if (found := taken_detectors(gaps, own, light)) else {}
+    buses = any(f"a:{program.light}.bus." in condition for condition in program.conditions.values())
+    return validated(JunctionTiming, made | ({"bus_priority": True} if buses else {}))
+
+
+def _read_called_stages(
+    program: FileProgram,
+) -> tuple[tuple[float, ...], float, dict[str, dict[str, float]]]:
+    """Stages of a program that calls those of the map: greens, offset, and loops with gaps each.
+
+    Raises
+    ------
+    InputError
+        If it does not come back to its first phase.
+    """
+    phases = [program.phases[n] for n in main_phases(program)]
+    stages = [(match[1], phase) for phase in phases if (match := STAGE_NAME.search(phase.name))]
+    cycle = sum(phase.seconds for phase in phases)
+    total = sum(phase.seconds for phase in program.phases)
+    gaps = {
+        name: {
+            loop: float(gap) for loop, gap in GAP.findall(program.conditions.get(f"end{name}", ""))
+        }
+        for name, _ in stages
+    }
+    offset = -((total - program.offset) % total) % cycle
+    return tuple(phase.seconds for _, phase in stages), offset, gaps

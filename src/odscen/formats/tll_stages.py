@@ -135,10 +135,10 @@ def file_stages(program: FileProgram) -> list[FileStage]:
     for n in turned:
         phase = phases[n]
         if n in firsts:
-            named = STAGE_NAME.search(phase.name)
+            match = STAGE_NAME.search(phase.name)
             stages.append(
                 FileStage(
-                    named[1] if named else "",
+                    match[1] if match else "",
                     phase.state,
                     phase.seconds,
                     phase.least,

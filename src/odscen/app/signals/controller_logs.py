@@ -209,11 +209,11 @@ def _links_of_phases(
             found += own
         links[channel] = tuple(found)
     taken = {link for own in links.values() for link in own}
-    left = [one for n, one in enumerate(view.movements) if n not in taken]
-    driven = sorted({one.name for one in left if one.drive})
+    left = [movement for n, movement in enumerate(view.movements) if n not in taken]
+    driven = sorted({movement.name for movement in left if movement.drive})
     if driven:
         raise InputError(f"no phase shows green to {some_of(driven)}: name one for each movement")
-    walks = sorted({one.name for one in left if one.walk})
+    walks = sorted({movement.name for movement in left if movement.walk})
     return links, [f"no phase is named for {some_of(walks)}: red all the time"] if walks else []
 
 
@@ -261,14 +261,14 @@ def _changes_of_channel(
     if not own["event"].is_in([code for code, letter in letters.items() if letter == "G"]).any():
         raise InputError(f"the log has no green of phase {channel}")
     state = _SHOWN_BEFORE.get(int(own["event"][0]), "r")
-    found = [_Change(0.0, state)]
+    changes = [_Change(0.0, state)]
     for stamp, code in zip(own["time"], own["event"], strict=True):
         letter = letters.get(code)
         if letter is None:
             continue
         steps = max(round((stamp - start).total_seconds() / step), 0)
-        found.append(_Change(steps * step, letter))
-    return found
+        changes.append(_Change(steps * step, letter))
+    return changes
 
 
 def _find_silences(events: pl.DataFrame) -> list[str]:

@@ -280,14 +280,14 @@ def _coordinate_lights(
         for n, view in zip(numbers, views, strict=True)
     ]
     phases = [
-        with_greens(merged_phases(plan.phases), one.green)
-        for plan, one in zip(plans, times, strict=True)
+        with_greens(merged_phases(plan.phases), passing.green)
+        for plan, passing in zip(plans, times, strict=True)
     ]
     waves = wave_lights(out, back, phases)
     offsets = widest_offsets(waves, cycle, favoured=favoured)
     entries = [
-        _retime_with_offset(scenario, one, offset, default=loaded.sumo.lights[n].offset)
-        for one, offset, n in zip(times, offsets, numbers, strict=True)
+        _retime_with_offset(scenario, passing, offset, default=loaded.sumo.lights[n].offset)
+        for passing, offset, n in zip(times, offsets, numbers, strict=True)
     ]
     new = with_timings(scenario, entries)
     refuse_errors(signal_problems(new.signals, loaded.lights))

@@ -134,6 +134,13 @@ def _own_program(shown: LightProgram, was: LightProgram, old: JunctionTiming) ->
             )
         )
     groups = tuple(ProgramGroup(id=group.id, movements=group.movements) for group in shown.groups)
+    control = "fixed" if old.control == "extended" else old.control  # stages of the map alone are
     return old.model_copy(
-        update={"groups": groups, "stages": tuple(stages), "green": (), "offset": plan.offset}
+        update={
+            "control": control,
+            "groups": groups,
+            "stages": tuple(stages),
+            "green": (),
+            "offset": plan.offset,
+        }
     )

@@ -161,13 +161,15 @@ def time_signals(
     volumes = turning_volumes(vehicles, duration=scenario.simulation.duration, begin=begin, end=end)
     timer = _Timer(scenario, loaded, volumes, saturation, bounds)
     lights = {number: timer.timed(number) for number in chosen}
-    timed = timer.in_step({n: one for n, one in lights.items() if one is not None})
+    timed = timer.in_step({n: light for n, light in lights.items() if light is not None})
     if not timed:
         raise InputError(
             f"no vehicle that departs between {volumes.begin:g} and {volumes.end:g} s comes to a "
             "traffic light"
         )
-    without = tuple(", ".join(loaded.lights[n].names) for n, one in lights.items() if one is None)
+    without = tuple(
+        ", ".join(loaded.lights[n].names) for n, light in lights.items() if light is None
+    )
     entries = [retimed(scenario, light.times) for light in timed.values()]
     new = with_timings(scenario, entries)
     refuse_errors(signal_problems(new.signals, loaded.lights))

@@ -274,8 +274,10 @@ def _elements_of_lights(
 ) -> list[etree._Element]:
     """Programs of some lights with their WAUTs, and detectors before them if they need any."""
     programs = [logic for logic in root.iter("tlLogic") if wanted(logic.get("id", ""))]
-    at = [one for one in root.iter("wautJunction") if wanted(one.get("junctionID", ""))]
-    names = {one.get("wautID") for one in at}
+    at = [
+        junction for junction in root.iter("wautJunction") if wanted(junction.get("junctionID", ""))
+    ]
+    names = {junction.get("wautID") for junction in at}
     wauts = [waut for waut in root.iter("WAUT") if waut.get("id") in names]
     loops: list[etree._Element] = []
     if any(logic.get("type", "static") != "static" for logic in programs):

@@ -100,12 +100,12 @@ def signal_sheets(
     lights = chosen_lights(signal_programs(workspace, scenario, whole_day=True), junctions)
     if not lights:
         raise InputError(f"map {scenario.map.name!r} has no traffic lights")
-    found: dict[str, str] = {}
+    sheets: dict[str, str] = {}
     for light in lights:
         stem = re.sub(r"[^\w.-]", "_", light.junctions[0])
-        name = f"{stem}.svg" if f"{stem}.svg" not in found else f"{stem}-{len(found)}.svg"
-        found[name] = signal_sheet(light, drawing=drawing, title=scenario.name)
-    return found
+        name = f"{stem}.svg" if f"{stem}.svg" not in sheets else f"{stem}-{len(sheets)}.svg"
+        sheets[name] = signal_sheet(light, drawing=drawing, title=scenario.name)
+    return sheets
 
 
 class GroupPair(NamedTuple):
@@ -135,7 +135,7 @@ def group_pairs(timing: JunctionTiming, light: Light) -> tuple[GroupPair, ...]:
     """All ordered pairs of groups of a program that meet, as in the document; else none."""
     program = DesignedProgram(timing, light, "fixed")
     given = {row[:2]: row[2] for row in timing.intergreens}
-    found = []
+    pairs = []
     for group in program.groups.values():
         for other in program.groups.values():
             if group is other:
@@ -145,8 +145,8 @@ def group_pairs(timing: JunctionTiming, light: Light) -> tuple[GroupPair, ...]:
             if needed or together != "free" or (group.id, other.id) in given:
                 pair = group.id, other.id
                 used = program.intergreen(*pair)
-                found.append(GroupPair(*pair, needed, given.get(pair), used, together))
-    return tuple(found)
+                pairs.append(GroupPair(*pair, needed, given.get(pair), used, together))
+    return tuple(pairs)
 
 
 def _rank_turn_against(
@@ -176,10 +176,10 @@ class DetectorLane(NamedTuple):
 
 def detector_lanes(loaded: LoadedMap, junction: str) -> tuple[DetectorLane, ...]:
     """Lanes of vehicles before a light, with their last :data:`DETECTABLE` metres."""
-    found = []
+    lanes = []
     for light, view in zip(loaded.sumo.lights, loaded.lights, strict=True):
         if junction in view.names:
             for n, line in lane_lines(light, loaded.sumo, DETECTABLE).items():
                 movement = view.movements[n]
-                found.append(DetectorLane(movement.lanes[0], movement.approach, line))
-    return tuple(found)
+                lanes.append(DetectorLane(movement.lanes[0], movement.approach, line))
+    return tuple(lanes)

@@ -156,7 +156,7 @@ def with_turn_arrows(
             changed = take_over_program(workspace, scenario, view.names[0])
         timing = timing_of(changed, view.names)
         assert timing is not None  # it was taken over
-        control = timing.control or scenario.signals.control
+        control = scenario.signals.control_of(timing)
         given = _place_arrows(timing, view, asked, on_call=control == "actuated")
         if given is not None:
             scenario = with_timings(changed, [given[0]])

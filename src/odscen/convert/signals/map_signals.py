@@ -219,25 +219,33 @@ def acting(odr: OpenDrive) -> Iterator[Acting]:
             known.setdefault(signal.id, (signal_kind(signal), element))
     for road in odr.roads.values():
         signals: tuple[Signal | SignalReference, ...] = (*road.signals, *road.signal_references)
-        for number, one in enumerate(signals):
-            kind, element = known.get(one.id, ("other", ""))
+        for number, road_signal in enumerate(signals):
+            kind, element = known.get(road_signal.id, ("other", ""))
             if number < len(road.signals):
                 kind, element = (
                     signal_kind(road.signals[number]),
-                    f"road {shown_id(road.id)} > signal {shown_id(one.id)}",
+                    f"road {shown_id(road.id)} > signal {shown_id(road_signal.id)}",
                 )
             if kind == "traffic_light" or kind in SIGN_KINDS:
-                yield Acting(one.id, element, kind, road.id, one.s, one.orientation, one.validities)
+                yield Acting(
+                    road_signal.id,
+                    element,
+                    kind,
+                    road.id,
+                    road_signal.s,
+                    road_signal.orientation,
+                    road_signal.validities,
+                )
 
 
 def _priority_places(odr: OpenDrive) -> Iterator[Acting]:
     """Places of the signs that give priority at the next junction."""
     for road in odr.roads.values():
-        for one in road.signals:
-            if sign_meaning(one) == "priority":
-                element = f"road {shown_id(road.id)} > signal {shown_id(one.id)}"
-                facing = one.orientation, one.validities
-                yield Acting(one.id, element, "priority", road.id, one.s, *facing)
+        for signal in road.signals:
+            if sign_meaning(signal) == "priority":
+                element = f"road {shown_id(road.id)} > signal {shown_id(signal.id)}"
+                facing = signal.orientation, signal.validities
+                yield Acting(signal.id, element, "priority", road.id, signal.s, *facing)
 
 
 def signal_control(
@@ -325,8 +333,8 @@ class _SignalReach:
     def controls(self, place: Acting) -> list[int]:
         """Connections under a place of a signal or, on roads outside junctions, ahead of it."""
         if self._is_in_junction(place.road):
-            return _on_connecting(place, self._table, self._connections, self._over)
-        found: list[int] = []
+            return _find_controlled_connections(place, self._table, self._connections, self._over)
+        numbers: list[int] = []
         for growing in (True, False):
             edge, _ = self._edge_ahead(place, growing=growing)
             if edge is None or not place.faces(growing=growing):
@@ -334,8 +342,8 @@ class _SignalReach:
             for number in self._leaving.get(edge, ()):
                 last = self._edges[edge].lanes[self._connections[number].source_lane].alignment[-1]
                 if place.applies_to(int(self._table.lane_id[last.row])):
-                    found.append(number)
-        return found
+                    numbers.append(number)
+        return numbers
 
     def _is_in_junction(self, road: RoadId) -> bool:
         """Whether a road is a connecting one, or so short that its junctions have taken it up."""
@@ -389,7 +397,7 @@ def _roads_of(alignment: LaneAlignment, table: RoadTable) -> Iterator[RoadId]:
         yield table.road_ids[table.lane_road[stretch.row]]
 
 
-def _on_connecting(
+def _find_controlled_connections(
     place: Acting,
     table: RoadTable,
     connections: Sequence[PlannedConnection],

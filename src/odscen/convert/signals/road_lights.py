@@ -181,7 +181,7 @@ class RoadLights:
 
     def _edges_faced(self, place: Acting) -> list[int]:
         """Edges on which vehicles come towards a light."""
-        found = []
+        edges = []
         for growing in (True, False):
             numbers = self._by_road.get((self._table.road_index[place.road], growing), ())
             if not numbers or not place.faces(growing=growing):
@@ -190,8 +190,8 @@ class RoadLights:
             gaps = [(self._metres_past(n, place.s), n) for n in numbers]
             edge = min(((gap, n) for gap, n in gaps if gap >= 0.0), default=max(gaps))[1]
             if self._valid_lanes(place, edge):
-                found.append(edge)
-        return found
+                edges.append(edge)
+        return edges
 
     def _valid_lanes(self, place: Acting, edge: int) -> set[int]:
         """Lanes of an edge, by index, that a light is valid for."""
@@ -298,7 +298,7 @@ def cut_for_lights(
     for road_id, lights in by_road.items():
         road = odr.roads[road_id]
         lights.sort(key=lambda light: light.place.s)
-        for group in _near_each_other(lights):
+        for group in _group_near_lights(lights):
             gap = _gap_of_lights(road, group, wider.get(road_id, ()))
             if gap is None:
                 continue
@@ -310,7 +310,7 @@ def cut_for_lights(
     return stops, wider
 
 
-def _near_each_other(lights: Sequence[StandingLight]) -> Iterator[list[StandingLight]]:
+def _group_near_lights(lights: Sequence[StandingLight]) -> Iterator[list[StandingLight]]:
     """Lights in the order of s in groups."""
     group: list[StandingLight] = []
     for light in lights:

@@ -171,12 +171,12 @@ class _GreenSharing:
 
     def met(self, rows: dict[int, int]) -> tuple[LinkConflict, ...]:
         """Pairs of links that meet, by their positions at the light."""
-        found = []
+        conflicts = []
         for i, j in self._pairs:
             if i in rows and j in rows:
                 gives_way = j in self._links.rights[i].yields_to
                 back = i in self._links.rights[j].yields_to
-                found.append(
+                conflicts.append(
                     LinkConflict(
                         rows[i],
                         rows[j],
@@ -186,7 +186,7 @@ class _GreenSharing:
                         self._clearing_seconds(j, i),
                     )
                 )
-        return tuple(sorted(found))
+        return tuple(sorted(conflicts))
 
     def _order_heads(
         self, heads: dict[tuple[str, tuple[str, ...], bool], list[int]]
@@ -202,7 +202,8 @@ class _GreenSharing:
                 item
                 for item in left
                 if item[0][2] == result[-1][0][2]
-                and self._apart_by(heading, self._links.movements[item[1][0]].heading_in) > OPPOSING
+                and self._angle_between(heading, self._links.movements[item[1][0]].heading_in)
+                > OPPOSING
             ]
             for item in opposite:
                 left.remove(item)
@@ -237,7 +238,7 @@ class _GreenSharing:
     # Rules
 
     @staticmethod
-    def _apart_by(heading: float, other: float) -> float:
+    def _angle_between(heading: float, other: float) -> float:
         return abs(wrapped(other - heading))
 
     def _turns_across(self, link: int) -> bool:
@@ -248,11 +249,11 @@ class _GreenSharing:
         movements = self._links.movements
         one = movements[i]
         if j >= self._count:
-            return abs(one.turn) > TURN and self._at_far_end(i, j)
+            return abs(one.turn) > TURN and self._crosses_at_far_end(i, j)
         other = movements[j]
         if one.source[0] == other.source[0]:
             return True
-        if self._apart_by(one.heading_in, other.heading_in) < OPPOSING:
+        if self._angle_between(one.heading_in, other.heading_in) < OPPOSING:
             return False
         turning = [n for n in (i, j) if abs(movements[n].turn) > TURN]
         if {movements[n].source for n in (i, j) if self._turns_across(n)} & self._protected:
@@ -269,7 +270,7 @@ class _GreenSharing:
         """Whether who makes the first movement waits inside until the other has left."""
         return i in self._links.waiting and j in self._links.rights[i].yields_to
 
-    def _at_far_end(self, link: int, crossing: int) -> bool:
+    def _crosses_at_far_end(self, link: int, crossing: int) -> bool:
         line, area = self._lines[link], self._areas[crossing - self._count]
         return bool(line.project(area.centroid) > line.length / 2.0)
 
@@ -294,7 +295,7 @@ class _GreenSharing:
         pairs = {frozenset(pair) for pair in self._pairs}
         return any(
             frozenset((turn, n)) in pairs
-            and self._apart_by(movements[turn].heading_in, movements[n].heading_in) > OPPOSING
+            and self._angle_between(movements[turn].heading_in, movements[n].heading_in) > OPPOSING
             for turn in turns
             for n in cars
         )
@@ -320,9 +321,9 @@ class _GreenSharing:
             walk = self._links.walkways[beginning - self._count].axis[:, :2]
             path = line.buffer(MOST_WIDTH)
             ways = [
-                _passed_metres(shapely.LineString(axis), path)[0] for axis in (walk, walk[::-1])
+                _measure_passage(shapely.LineString(axis), path)[0] for axis in (walk, walk[::-1])
             ]
-            last = _passed_metres(line, self._areas[beginning - self._count])[1]
+            last = _measure_passage(line, self._areas[beginning - self._count])[1]
             seconds = self._leaving_seconds(ending, last) - min(ways) / ENTERING_WALKER
         return min(max(float(math.ceil(seconds)), 1.0), MOST_RED)
 
@@ -363,7 +364,7 @@ def _meeting_places(one: shapely.LineString, other: shapely.LineString) -> list[
     return [shapely.Point(xy) for xy in shapely.get_coordinates(shared)]
 
 
-def _passed_metres(line: shapely.LineString, place: shapely.Geometry) -> tuple[float, float]:
+def _measure_passage(line: shapely.LineString, place: shapely.Geometry) -> tuple[float, float]:
     """Metres along a line to the first and the last of it in a place."""
     shared = line.intersection(place)
     if shared.is_empty:

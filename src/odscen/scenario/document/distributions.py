@@ -93,7 +93,7 @@ class Choice(Part):
     weights: tuple[Annotated[float, Field(ge=0)], ...] | None = None
 
     @model_validator(mode="after")
-    def _same_length(self) -> Choice:
+    def _check_weights_given(self) -> Choice:
         if self.weights is not None:
             if len(self.weights) != len(self.values):
                 raise ValueError(f"{len(self.values)} values but {len(self.weights)} weights")
@@ -106,7 +106,7 @@ class Choice(Part):
         return self.values[draw_place(weights, rng)]
 
 
-def _from_number(value: Any) -> Any:
+def _read_number(value: Any) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return {"kind": "constant", "value": value}
     if isinstance(value, dict):
@@ -119,7 +119,7 @@ def _from_number(value: Any) -> Any:
 
 Distribution = Annotated[
     Annotated[Constant | Uniform | Normal | Choice, Field(discriminator="kind")],
-    BeforeValidator(_from_number),
+    BeforeValidator(_read_number),
 ]
 """A number, or a table with ``kind`` constant, uniform, normal or choice."""
 
@@ -154,8 +154,10 @@ def draw_place(weights: Sequence[float], rng: np.random.Generator) -> int:
     """Draw an index by weight; at least one weight must be above 0."""
     total = np.cumsum(weights)
     # What is drawn lies below the total, but may be rounded to it: then the last that counts.
-    last = np.searchsorted(total, total[-1])
-    return int(min(np.searchsorted(total, rng.uniform(0.0, total[-1]), side="right"), last))
+    last_weighted = np.searchsorted(total, total[-1])
+    return int(
+        min(np.searchsorted(total, rng.uniform(0.0, total[-1]), side="right"), last_weighted)
+    )
 
 
 def draw_key(shares: Mapping[_Key, float], rng: np.random.Generator) -> _Key:

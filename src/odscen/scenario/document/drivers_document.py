@@ -49,8 +49,8 @@ def _check_parameter(name: str, low: float, high: float) -> None:
         raise ValueError(f"drivers have no parameter {name!r}{hint}")
     if not known.low <= low <= high <= known.high:
         unit = f" {known.unit}" if known.unit else ""
-        said = f"{low:g}" if low == high else f"{low:g} to {high:g}"
-        raise ValueError(f"{name} must be {known.low:g} to {known.high:g}{unit}, not {said}")
+        range_text = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        raise ValueError(f"{name} must be {known.low:g} to {known.high:g}{unit}, not {range_text}")
 
 
 class Drivers(Part):
@@ -73,7 +73,7 @@ class Drivers(Part):
     shares: dict[Identifier, Annotated[float, Field(gt=0)]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
-    def _one_headway(self) -> Self:
+    def _check_one_headway(self) -> Self:
         if self.saturation_flow is not None and self.headway is not None:
             raise ValueError(
                 "give one of saturation_flow and headway, not both: each decides the other"
@@ -81,7 +81,7 @@ class Drivers(Part):
         return self
 
     @model_validator(mode="after")
-    def _known_styles(self) -> Self:
+    def _check_styles(self) -> Self:
         ids = [driver_set.id for driver_set in self.sets]
         twice = sorted({name for name in ids if ids.count(name) > 1})
         if twice:

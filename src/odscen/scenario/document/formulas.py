@@ -155,8 +155,8 @@ def computed(data: dict[str, Any], *, file: str | None = None) -> dict[str, Any]
     """
     reading = _FormulaReader({}, {}, [])
     parameters: dict[str, Any] = {}
-    for name, said in data["parameters"].items():
-        parameters[name] = reading.walked(said, f"parameters/{_escape_key(name)}", name)
+    for name, declaration in data["parameters"].items():
+        parameters[name] = reading.walked(declaration, f"parameters/{_escape_key(name)}", name)
         number = parameters[name].get("value") if isinstance(parameters[name], dict) else None
         if isinstance(number, int | float):
             reading.values[name] = float(number)
@@ -191,13 +191,13 @@ class _FormulaReader:
             return self._read_value(node, place) if _is_formula(node, key, self.values) else node
         if isinstance(node, dict):
             return {
-                name: self.walked(one, _extend_pointer(place, name), name)
-                for name, one in node.items()
+                name: self.walked(part, _extend_pointer(place, name), name)
+                for name, part in node.items()
             }
         if isinstance(node, list):
             return [
-                self.walked(one, _extend_pointer(place, part), key)
-                for part, one in _list_parts(node)
+                self.walked(item, _extend_pointer(place, part), key)
+                for part, item in _list_parts(node)
             ]
         return node
 
@@ -226,7 +226,7 @@ def put_back(
     whole
         The same with all of its fields.
     """
-    values = {name: float(one["value"]) for name, one in whole["parameters"].items()}
+    values = {name: float(parameter["value"]) for name, parameter in whole["parameters"].items()}
     for place, text in formulas.items():
         keys = [_unescape_key(key) for key in place.split("/")]
         try:
@@ -276,9 +276,9 @@ def _is_formula(text: str, key: str, values: Mapping[str, float]) -> bool:
 def _list_parts(node: list[Any]) -> Iterator[tuple[str, Any]]:
     """Each part of a list with its id, or its index if it has none of its own."""
     ids = [row.get("id") if isinstance(row, dict) else None for row in node]
-    for index, (name, one) in enumerate(zip(ids, node, strict=True)):
+    for index, (name, part) in enumerate(zip(ids, node, strict=True)):
         own = isinstance(name, str) and ids.count(name) == 1
-        yield name if own and name is not None else str(index), one
+        yield name if own and name is not None else str(index), part
 
 
 def _looked_up(node: Any, keys: list[str]) -> Any:

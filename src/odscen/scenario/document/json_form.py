@@ -84,8 +84,8 @@ def dumps(scenario: Scenario) -> str:
         if key in ("actors", "flows", *OPTIONAL):
             data[key] = without_defaults(scenario, key)
         elif key == "simulation":
-            said = scenario.simulation.model_dump(mode="json", exclude_defaults=True)
-            data[key] = {name: data[key][name] for name in ALWAYS} | said
+            simulation = scenario.simulation.model_dump(mode="json", exclude_defaults=True)
+            data[key] = {name: data[key][name] for name in ALWAYS} | simulation
     if scenario.formulas:
         put_back(data, scenario.model_dump(mode="json"), scenario.formulas)
     fields = [
@@ -141,7 +141,7 @@ def _formulas_too(node: Any) -> Any:
         outer = {key: node[key] for key in ("title", "default", "description") if key in node}
         inner = {key: value for key, value in node.items() if key not in outer}
         return {"anyOf": [inner, {"$ref": "#/$defs/Formula"}], **outer}
-    return {key: _formulas_too(one) for key, one in node.items()}
+    return {key: _formulas_too(part) for key, part in node.items()}
 
 
 def _with_numbers(text: str | bytes, file: str | None) -> str | bytes:
@@ -160,8 +160,8 @@ def _with_numbers(text: str | bytes, file: str | None) -> str | bytes:
 def _lay_out_field(key: str, value: object) -> str:
     if key == "parameters" and isinstance(value, dict):
         fields = (
-            f"    {json.dumps(name)}: {json.dumps(one, ensure_ascii=False)}"
-            for name, one in value.items()
+            f"    {json.dumps(name)}: {json.dumps(part, ensure_ascii=False)}"
+            for name, part in value.items()
         )
         return "{\n" + ",\n".join(fields) + "\n  }"
     if key in ("demand", "transit", "study", "variant") and isinstance(value, dict):

@@ -27,7 +27,7 @@ class TimedMeasure(Part):
     end: Seconds | None = None
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check_order(self) -> Self:
         if self.end is not None and self.end <= self.begin:
             raise ValueError(f"it ends at {self.end:g} s, not after it begins ({self.begin:g} s)")
         return self
@@ -96,7 +96,7 @@ class ChangedPermission(TimedMeasure):
     banned: tuple[Category, ...] = ()
 
     @model_validator(mode="after")
-    def _one_of_both(self) -> Self:
+    def _check_one_of_both(self) -> Self:
         if bool(self.allowed) == bool(self.banned):
             raise ValueError("give either allowed or banned")
         if Category.PEDESTRIAN in (*self.allowed, *self.banned):

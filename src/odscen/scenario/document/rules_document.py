@@ -49,7 +49,7 @@ class Bounded(Part):
     above: Signed | None = None
 
     @model_validator(mode="after")
-    def _one_bound(self) -> Self:
+    def _check_one_bound(self) -> Self:
         one_of(self, ("below", "above"), "bound")
         return self
 
@@ -104,7 +104,7 @@ class DistanceBounded(OwnBounded):
     behind: PointsBehind = CENTRES
 
     @model_validator(mode="after")
-    def _one_end(self) -> Self:
+    def _check_one_end(self) -> Self:
         one_of(self, ("to", "place"), "end")
         return self
 
@@ -210,7 +210,7 @@ class Condition(Part):
     edge: Literal["none", "rising"] = "none"
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Self:
+    def _check_one_kind(self) -> Self:
         kinds = tuple(name for name in type(self).model_fields if name not in ("delay", "edge"))
         one_of(self, kinds, "condition")
         return self
@@ -249,7 +249,7 @@ class SpeedChange(Part):
     within: Positive | None = None
 
     @model_validator(mode="after")
-    def _one_measure(self) -> Self:
+    def _check_single_measure(self) -> Self:
         names = ("rate", "over", "within")
         if self.shape != "step":
             one_of(self, names, "measure")
@@ -365,7 +365,7 @@ class GapKeeping(Part):
     once: bool = False
 
     @model_validator(mode="after")
-    def _one_gap(self) -> Self:
+    def _check_one_gap(self) -> Self:
         one_of(self, ("metres", "seconds"), "gap")
         return self
 
@@ -412,7 +412,7 @@ class PathFollowing(Part):
         return self
 
     @model_validator(mode="after")
-    def _one_timing(self) -> Self:
+    def _check_one_timing(self) -> Self:
         given = [name for name in ("speed", "speeds", "times") if getattr(self, name)]
         if len(given) > 1:
             raise ValueError(f"give one of speed, speeds and times, not {' and '.join(given)}")
@@ -580,7 +580,7 @@ class Action(Part):
     together: Annotated[tuple[Action, ...], Field(min_length=2)] | None = None
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Self:
+    def _check_one_kind(self) -> Self:
         one_of(self, tuple(type(self).model_fields), "action")
         for action in self.together or ():
             if action.together is not None:
@@ -625,10 +625,10 @@ def rule_parts(rule: StoryRule, where: str) -> Iterator[RulePart]:
     """All conditions and actions of a rule that are not combinations, in order."""
     yield from _condition_parts(rule.when, f"{where}.when")
     for index, item in enumerate(rule.then):
-        for number, one in enumerate(item.parts):
+        for number, part in enumerate(item.parts):
             inside = f".together[{number}]" if item.together else ""
-            place = f"{where}.then[{index}]{inside}.{one.kind}"
-            yield RulePart(place, one.kind, getattr(one, one.kind))
+            place = f"{where}.then[{index}]{inside}.{part.kind}"
+            yield RulePart(place, part.kind, getattr(part, part.kind))
 
 
 def _condition_parts(condition: Condition, where: str) -> Iterator[RulePart]:
@@ -636,8 +636,8 @@ def _condition_parts(condition: Condition, where: str) -> Iterator[RulePart]:
     if kind == "not_" and condition.not_ is not None:
         yield from _condition_parts(condition.not_, f"{where}.not")
     elif kind in ("all", "any"):
-        for index, one in enumerate(getattr(condition, kind)):
-            yield from _condition_parts(one, f"{where}.{kind}[{index}]")
+        for index, part in enumerate(getattr(condition, kind)):
+            yield from _condition_parts(part, f"{where}.{kind}[{index}]")
     else:
         yield RulePart(f"{where}.{kind}", kind, getattr(condition, kind))
 
@@ -650,7 +650,7 @@ def places_of(part: Part) -> Iterator[tuple[str, RulePlace]]:
         return
     for name in ("place", "to", "at", "when_at"):
         value = getattr(part, name, None)
-        if value is not None and not (name == "to" and _to_is_actor(part)):
+        if value is not None and not (name == "to" and _names_actor_in_to(part)):
             yield name, value
     for name in ("through", "points"):
         for index, value in enumerate(getattr(part, name, ())):
@@ -661,7 +661,7 @@ def actors_of(part: Part) -> Iterator[tuple[str, str]]:
     """Actors that a condition or action names, with the names of their fields."""
     for name in ("of", "to", "relative_to"):
         value = getattr(part, name, None)
-        if isinstance(value, str) and (name != "to" or _to_is_actor(part)):
+        if isinstance(value, str) and (name != "to" or _names_actor_in_to(part)):
             yield name, value
 
 
@@ -675,6 +675,6 @@ def appearing_actors(rules: Iterable[StoryRule]) -> frozenset[str]:
     )
 
 
-def _to_is_actor(part: Part) -> bool:
+def _names_actor_in_to(part: Part) -> bool:
     """Whether ``to`` is an actor: it is a place, a speed or an offset in some."""
     return not isinstance(part, Walking | SpeedChange | LateralMove | LaneChange | NewGoal)

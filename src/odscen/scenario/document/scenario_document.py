@@ -84,7 +84,7 @@ class TransitLine(Part):
     model: Label | None = None
 
     @model_validator(mode="after")
-    def _one_timetable(self) -> Self:
+    def _check_one_timetable(self) -> Self:
         if (self.headway is None) == (not self.departures):
             raise ValueError(
                 f"give one of headway and departures, not {'both' if self.headway else 'none'}"
@@ -422,7 +422,7 @@ class Profile(Part):
     end: Annotated[float, Field(gt=0, le=86_400)] | None = None
 
     @model_validator(mode="after")
-    def _not_empty(self) -> Self:
+    def _check_not_empty(self) -> Self:
         if sum(self.shares) <= 0:
             raise ValueError("at least one share must be above 0")
         return self
@@ -513,7 +513,7 @@ class Background(Window):
     trips: Annotated[float, Field(gt=0, le=1e7)] | None = None
 
     @model_validator(mode="after")
-    def _one_amount(self) -> Self:
+    def _check_one_amount(self) -> Self:
         given = [name for name in ("fill", "per_km", "trips") if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(
@@ -544,7 +544,7 @@ class VehicleInput(Window):
     to: Annotated[tuple[tuple[Label, Share], ...], Field(max_length=1000)] = ()
 
     @model_validator(mode="after")
-    def _one_volume(self) -> Self:
+    def _check_one_volume(self) -> Self:
         if (self.per_hour is None) == (not self.volumes):
             raise ValueError(
                 f"give one of per_hour and volumes, not {'both' if self.volumes else 'none'}"

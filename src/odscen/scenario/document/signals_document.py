@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from odscen.scenario.document.document_parts import Identifier, Label, Part
 
 SignalSeconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
-Control = Literal["fixed", "actuated"]
+Control = Literal["fixed", "extended", "actuated"]
 MOST_STAGES: Final = 100
 """Stages of a program, and groups; each stage is held against each."""
 MOST_PLANS: Final = 100
@@ -126,7 +126,7 @@ class JunctionTiming(Part):
     bus_priority: bool | None = None
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Self:
+    def _check_one_kind(self) -> Self:
         if bool(self.groups) != bool(self.stages):
             raise ValueError("a program needs both groups and stages")
         if self.groups and self.green:
@@ -137,7 +137,10 @@ class JunctionTiming(Part):
 
 
 class Signals(Part):
-    """How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
+    """How traffic lights are run: fixed-time, extended or actuated.
+
+    Extended lights of the map keep its greens, and prolong each while vehicles follow each other,
+    up to a cycle of two minutes. Actuated ones let arriving vehicles call stages and end greens.
 
     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
     that waits elsewhere.
@@ -146,3 +149,8 @@ class Signals(Part):
     control: Control = "fixed"
     bus_priority: bool = False
     junctions: tuple[JunctionTiming, ...] = ()
+
+    def control_of(self, timing: JunctionTiming) -> Control:
+        """How a light is run: what its program has of its own is not extended."""
+        control = timing.control or self.control
+        return "fixed" if timing.stages and control == "extended" else control

@@ -67,8 +67,8 @@ def green_bands(
     """Widest band of either direction with given offsets; none lasts 0 s."""
     pairs = list(zip(lights, offsets, strict=True))
     return (
-        _widest_band([(one.out, offset - one.out_time) for one, offset in pairs], cycle),
-        _widest_band([(one.back, offset - one.back_time) for one, offset in pairs], cycle),
+        _widest_band([(light.out, offset - light.out_time) for light, offset in pairs], cycle),
+        _widest_band([(light.back, offset - light.back_time) for light, offset in pairs], cycle),
     )
 
 

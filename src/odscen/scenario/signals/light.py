@@ -141,19 +141,23 @@ def find_movements(name: str, movements: Sequence[SignalMovement]) -> tuple[int,
     """Places of the movements that ``name`` refers to; empty if there are none."""
     first, _, rest = name.strip().partition(" ")
     if first == "walk":
-        return tuple(n for n, one in enumerate(movements) if one.walk and rest in one.legs)
+        return tuple(
+            n for n, movement in enumerate(movements) if movement.walk and rest in movement.legs
+        )
     if rest:
         return tuple(
-            n for n, one in enumerate(movements) if one.approach == first and one.turn == rest
+            n
+            for n, movement in enumerate(movements)
+            if movement.approach == first and movement.turn == rest
         )
     parts = first.split(">")
     source, target = parts[0], parts[-1] if len(parts) > 1 else None
     return tuple(
         n
-        for n, one in enumerate(movements)
-        if one.drive
-        and source in (one.approach, one.lanes[0])
-        and target in (None, one.exit, one.lanes[1])
+        for n, movement in enumerate(movements)
+        if movement.drive
+        and source in (movement.approach, movement.lanes[0])
+        and target in (None, movement.exit, movement.lanes[1])
     )
 
 

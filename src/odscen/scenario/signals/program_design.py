@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 def detector_movements(at: str, movements: Sequence[SignalMovement]) -> tuple[int, ...]:
     """Movements over the lanes of an approach (``r12``), or of one lane (``12.0.-1``)."""
     return tuple(
-        n for n, one in enumerate(movements) if one.drive and at in (one.approach, one.lanes[0])
+        n
+        for n, movement in enumerate(movements)
+        if movement.drive and at in (movement.approach, movement.lanes[0])
     )
 
 

@@ -90,7 +90,9 @@ class CorridorFinder:
                 inside = self._inner_lengths(number, own[0])
                 lanes = [*inside, *self._lane_lengths(ways[place])]
                 metres.append(metres[-1] + sum(length for length, _ in lanes))
-                seconds.append(seconds[-1] + sum(one / (speed or limit) for one, limit in lanes))
+                seconds.append(
+                    seconds[-1] + sum(length / (speed or limit) for length, limit in lanes)
+                )
         return CorridorDirection(tuple(links), tuple(metres), tuple(seconds))
 
     def _links_along(self, number: int, source: str | None, target: str | None) -> tuple[int, ...]:
@@ -111,10 +113,10 @@ class CorridorFinder:
         """Shortest way from a light to the stop line of another, as edges."""
         exits = sorted({turn.target for turn in self._turns[one]})
         stops = sorted({turn.source for turn in self._turns[other]})
-        found = [
+        paths = [
             path for a in exits for b in stops if (path := self._net.path(a, b, DRIVEN)) is not None
         ]
-        return min(found, key=lambda path: (self._path_length(path), path), default=None)
+        return min(paths, key=lambda path: (self._path_length(path), path), default=None)
 
     def _path_length(self, path: Sequence[str] | None) -> float:
         return float("inf") if path is None else self._net.path_length(path)
@@ -127,14 +129,14 @@ class CorridorFinder:
 
     def _lane_lengths(self, path: Sequence[str]) -> list[tuple[float, float]]:
         """Lengths and speed limits of edges and of what lies between them."""
-        found = []
+        lengths = []
         for edge, after in pairwise((*path, "")):
             lanes = [lane for lane in self._net.edge_lanes[edge] if lane.allows(DRIVEN)]
-            found.append((lanes[-1].length, lanes[-1].speed))
+            lengths.append((lanes[-1].length, lanes[-1].speed))
             passages = (self._net.passage(lane.id, after) for lane in lanes) if after else ()
             passed = next((passage for passage in passages if passage), ())
-            found += [(lane.length, lane.speed) for lane in passed[:-1]]
-        return found
+            lengths += [(lane.length, lane.speed) for lane in passed[:-1]]
+        return lengths
 
     def _refuse_lights_between(
         self, numbers: Sequence[int], ways: Sequence[tuple[str, ...]]
@@ -157,21 +159,21 @@ class CorridorFinder:
 def green_windows(phases: Sequence[ProgramPhase], links: Sequence[int]) -> tuple[GreenWindow, ...]:
     """Stretches of a program in which all of these links have green."""
     cycle = sum(phase.seconds for phase in phases)
-    found: list[GreenWindow] = []
+    windows: list[GreenWindow] = []
     now = 0.0
     for phase in phases:
         if all(phase.state[n] in "Gg" for n in links):
-            last = found[-1] if found else None
+            last = windows[-1] if windows else None
             if last is not None and abs(last.begin + last.seconds - now) < 1e-9:
-                found[-1] = last._replace(seconds=last.seconds + phase.seconds)
+                windows[-1] = last._replace(seconds=last.seconds + phase.seconds)
             else:
-                found.append(GreenWindow(now, phase.seconds))
+                windows.append(GreenWindow(now, phase.seconds))
         now += phase.seconds
-    if len(found) > 1 and found[0].begin == 0.0:
-        last = found[-1]
+    if len(windows) > 1 and windows[0].begin == 0.0:
+        last = windows[-1]
         if abs(last.begin + last.seconds - cycle) < 1e-9:
-            found[-1] = last._replace(seconds=last.seconds + found.pop(0).seconds)
-    return tuple(found)
+            windows[-1] = last._replace(seconds=last.seconds + windows.pop(0).seconds)
+    return tuple(windows)
 
 
 def wave_lights(
@@ -187,10 +189,10 @@ def wave_lights(
         The other direction, whose first light is the last of the corridor.
     """
     count = len(programs)
-    found = []
+    lights = []
     for place, phases in enumerate(programs):
         there = count - 1 - place
-        found.append(
+        lights.append(
             WaveLight(
                 green_windows(phases, out.links[place]) if out else (),
                 green_windows(phases, back.links[there]) if back else (),
@@ -198,4 +200,4 @@ def wave_lights(
                 back.seconds[there] if back else 0.0,
             )
         )
-    return tuple(found)
+    return tuple(lights)

@@ -251,9 +251,9 @@ class _PassablePlaces:
     def _passable_places(self) -> set[str]:
         region = Region.of(self._map.graph, self._scenario.roi)
         ground = TripEnds(region, usable_places(self._map))
-        found: set[str] = set()
+        passable_places: set[str] = set()
         for part in self._scenario.demand.counts:
             passing = StationFinder(region.graph, [row[0] for row in part.rows])
             kinds = routes_past(ground, part, passing)
-            found.update(passing.places[place] for kind in kinds for place in kind)
-        return found
+            passable_places.update(passing.places[place] for kind in kinds for place in kind)
+        return passable_places

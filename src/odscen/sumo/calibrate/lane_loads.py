@@ -134,19 +134,19 @@ class LightDemand:
     @property
     def movements(self) -> tuple[MovementVolume, ...]:
         """Volume of each movement of vehicles."""
-        found = []
+        volumes = []
         for turn, links in self._turns.items():
             movement = self._view.movements[links[0]]
             volume = self._volumes[turn]
-            found.append(
+            volumes.append(
                 MovementVolume(movement.name, movement.turn, volume.vehicles, volume.heavy)
             )
-        return tuple(found)
+        return tuple(volumes)
 
     def needs(self) -> tuple[LaneNeed, ...]:
         """Flow ratio of each lane, with the numbers of the stages in which it has green."""
         stages = [phase for phase in self._phases if phase.stage]
-        found = []
+        needs = []
         for lane in self.lanes:
             if lane.gaps is not None:
                 shown = [{phase.state[n] for n in lane.links} for phase in stages]
@@ -156,7 +156,7 @@ class LightDemand:
                     for number, letters in enumerate(shown)
                     if "g" in letters
                 )
-                found.append(LaneNeed(lane.ratio, free, gaps))
+                needs.append(LaneNeed(lane.ratio, free, gaps))
                 continue
             for quorum in (all, any):
                 green = tuple(
@@ -166,8 +166,8 @@ class LightDemand:
                 )
                 if green:
                     break
-            found.append(LaneNeed(lane.ratio, green))
-        return tuple(found)
+            needs.append(LaneNeed(lane.ratio, green))
+        return tuple(needs)
 
     def _load_lanes(self) -> tuple[LaneLoad, ...]:
         """Divide movements among their lanes: each part takes the lane of least ratio."""
@@ -178,7 +178,7 @@ class LightDemand:
             self._list_streams(), key=lambda stream: (len(stream.links), stream.turn)
         ):
             weight = 1.0 + (HEAVY - 1.0) * stream.heavy / stream.vehicles
-            needs = {n: weight * self._through_equivalent(n) / self._base for n in stream.links}
+            needs = {n: weight * self._equivalent_of_through(n) / self._base for n in stream.links}
             for _ in range(_SHARES):
                 n = min(needs, key=lambda n: (work[self._light.links[n].source] + needs[n], n))
                 lane = self._light.links[n].source
@@ -204,17 +204,17 @@ class LightDemand:
 
     def _list_streams(self) -> list[_Stream]:
         """Vehicles by the lanes that are open to them: bicycles take theirs, if there is one."""
-        found = []
+        streams = []
         for turn, own in self._turns.items():
             volume, lanes = self._volumes[turn], self._net.lanes
             driven = tuple(n for n in own if lanes[self._light.links[n].source].allows(DRIVEN))
             beside = tuple(n for n in own if n not in driven)
             apart = volume.bicycles if driven and beside else 0.0
-            found += [
+            streams += [
                 _Stream(driven or own, turn, volume.vehicles - apart, volume.heavy),
                 _Stream(beside, turn, apart, 0.0),
             ]
-        return [stream for stream in found if stream.vehicles > 0.0]
+        return [stream for stream in streams if stream.vehicles > 0.0]
 
     def _share_through_gaps(self, load: LaneLoad) -> float | None:
         """What a lane of protected-permissive turns alone carries through gaps, as a share."""
@@ -227,10 +227,10 @@ class LightDemand:
         """Flow ratio of the queue that a lane of turns through gaps alone waits for."""
         if not all(self._is_permissive(n) or self._is_protected_permissive(n) for n in load.links):
             return 0.0
-        before = {other for n in load.links for other in self._given_way(n)}
+        before = {other for n in load.links for other in self._find_given_way(n)}
         return max((load.ratio for load in loads if before & set(load.links)), default=0.0)
 
-    def _through_equivalent(self, link: int) -> float:
+    def _equivalent_of_through(self, link: int) -> float:
         turn = self._view.movements[link].turn
         if turn == "straight":
             return 1.0
@@ -254,7 +254,7 @@ class LightDemand:
             return set()
         return {phase.state[link] for phase in self._phases if phase.stage} & {"g", "G"}
 
-    def _given_way(self, link: int) -> set[int]:
+    def _find_given_way(self, link: int) -> set[int]:
         """Movements that have green together with one that gives way to them."""
         greens = [phase.state for phase in self._phases if phase.stage and phase.state[link] == "g"]
         before = {
@@ -266,7 +266,7 @@ class LightDemand:
 
     def _opposing_flow(self, link: int) -> float:
         """Vehicles an hour that a permissive movement gives way to while both have green."""
-        before = self._given_way(link)
+        before = self._find_given_way(link)
         return sum(
             self._volumes[turn].vehicles
             for turn, links in self._turns.items()

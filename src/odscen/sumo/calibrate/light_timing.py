@@ -160,13 +160,15 @@ def plan_at(shown: LightProgram, time: float) -> ShownPlan:
 
 def merged_phases(phases: Sequence[ProgramPhase]) -> tuple[ProgramPhase, ...]:
     """Phases, with the parts of one green as one."""
-    found: list[ProgramPhase] = []
+    program_phases: list[ProgramPhase] = []
     for phase in phases:
-        if found and phase.stage and found[-1].stage == phase.stage:
-            found[-1] = found[-1]._replace(seconds=found[-1].seconds + phase.seconds)
+        if program_phases and phase.stage and program_phases[-1].stage == phase.stage:
+            program_phases[-1] = program_phases[-1]._replace(
+                seconds=program_phases[-1].seconds + phase.seconds
+            )
         else:
-            found.append(phase)
-    return tuple(found)
+            program_phases.append(phase)
+    return tuple(program_phases)
 
 
 def with_greens(
@@ -188,14 +190,14 @@ def stage_needs(
     own = {stage.id: stage.min_green for stage in timing.stages} if timing else {}
     letters = list(zip(*(phase.state for phase in phases if phase.stage), strict=True))
     both = {n for n, shown in enumerate(letters) if {"g", "G"} <= set(shown)}
-    found = []
+    needs = []
     for number, phase in enumerate(phases):
         if not phase.stage:
             continue
         green = {n for n, letter in enumerate(phase.state) if letter in "Gg"}
         cars = {n for n in green if not view.movements[n].walk}
         if not cars:
-            found.append(StageNeed(phase.seconds, fixed=True))
+            needs.append(StageNeed(phase.seconds, fixed=True))
             continue
         given = own.get(phase.stage)
         least = min(LEAST_GREEN, phase.seconds) if given is None else given
@@ -205,8 +207,8 @@ def stage_needs(
         more = _green_beside(phases[number + 1 :], shown) + _green_beside(
             phases[:number][::-1], shown
         )
-        found.append(StageNeed(least, more))
-    return tuple(found)
+        needs.append(StageNeed(least, more))
+    return tuple(needs)
 
 
 def _green_beside(phases: Sequence[ProgramPhase], shown: Mapping[int, str]) -> float:

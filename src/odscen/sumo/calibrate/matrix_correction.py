@@ -173,8 +173,10 @@ def corrected(
         modelled = others + shares @ numbers
         used = np.asarray(shares.sum(axis=1)) > 0.0
         rows = tuple(
-            _fit_of_count(one, number, passable, apart.by_count)
-            for one, number, passable in zip(seen, modelled.tolist(), used.tolist(), strict=True)
+            _fit_of_count(station, number, passable, apart.by_count)
+            for station, number, passable in zip(
+                seen, modelled.tolist(), used.tolist(), strict=True
+            )
         )
         return CountFits("planned", rows, round(float(numbers.sum())), apart.words)
 
@@ -235,8 +237,8 @@ def share_matrix(
     Trips depart evenly over the slice of their cell.
     """
     of_place: dict[str, list[int]] = defaultdict(list)
-    for row, one in enumerate(seen):
-        of_place[one.place].append(row)
+    for row, station in enumerate(seen):
+        of_place[station.place].append(row)
     entries: dict[tuple[int, int], float] = defaultdict(float)
     for column, cell in enumerate(cells):
         known = passages.get(cell.pair)
@@ -278,8 +280,10 @@ def least_squares(
         [exact @ shares @ sparse.diags_array(prior), sparse.diags_array(kept * prior)]
     ).tocsr()
     target = np.concatenate([exact @ wanted, kept * prior])
-    found = lsq_linear(scaled, target, bounds=(0.0, np.inf), max_iter=MOST_ROUNDS, lsmr_tol="auto")
-    return np.asarray(found.x * prior, dtype=np.float64)
+    solution = lsq_linear(
+        scaled, target, bounds=(0.0, np.inf), max_iter=MOST_ROUNDS, lsmr_tol="auto"
+    )
+    return np.asarray(solution.x * prior, dtype=np.float64)
 
 
 def whole_trips(cells: Sequence[MatrixCell], trips: FloatArray) -> FloatArray:

@@ -236,18 +236,18 @@ def approach_capacities(sumo_map: SumoMap) -> dict[str, float]:
         segment_name("junction", name): len(light.green) for light in lights for name in light.names
     }
     before: dict[str, list[str]] = {name: [] for name in junctions}
-    for one, others in transitions(graph).items():
+    for segment, others in transitions(graph).items():
         for other in others & junctions:
-            before[other].append(one)
+            before[other].append(segment)
     lanes = _lanes_between(sumo_map)
     carried: dict[str, float] = {}
     for junction, ones in before.items():
         shared = SATURATION * (1.0 - LOST) / max(stages.get(junction, len(ones)), 1)
-        for one in ones:
-            own = lanes[one, junction] * shared
+        for approach in ones:
+            own = lanes[approach, junction] * shared
             if junction not in stages and len(ones) > 2:
-                own = lanes[one, junction] * MEETING / len(ones)
-            carried[f"{one}>{junction}"] = own
+                own = lanes[approach, junction] * MEETING / len(ones)
+            carried[f"{approach}>{junction}"] = own
     return carried
 
 
@@ -258,5 +258,5 @@ def _lanes_between(sumo_map: SumoMap) -> Counter[tuple[str, str]]:
     crosses = lanes.segment[lanes.source] != lanes.segment[lanes.target]
     source, target = lanes.source[crosses], lanes.target[crosses]
     rows = np.stack([lanes.segment[source], lanes.segment[target], lanes.lane[source]], axis=1)
-    found = np.unique(rows, axis=0)[:, :2].tolist()
-    return Counter((str(ids[one]), str(ids[other])) for one, other in found)
+    pairs = np.unique(rows, axis=0)[:, :2].tolist()
+    return Counter((str(ids[one]), str(ids[other])) for one, other in pairs)

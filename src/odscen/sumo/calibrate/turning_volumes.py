@@ -135,12 +135,12 @@ def driven_vehicles(
 def turns_of(light: SumoLight, sumo_map: SumoMap) -> dict[Turn, tuple[int, ...]]:
     """Links of a light by the turn that they are for; crossings are left out."""
     lanes = sumo_map.net.lanes
-    found: dict[Turn, list[int]] = {}
+    turns: dict[Turn, list[int]] = {}
     for number, link in enumerate(light.links):
         if link.turn != CROSSED:
             turn = Turn(lanes[link.source].edge, lanes[link.target].edge)
-            found.setdefault(turn, []).append(number)
-    return {turn: tuple(numbers) for turn, numbers in found.items()}
+            turns.setdefault(turn, []).append(number)
+    return {turn: tuple(numbers) for turn, numbers in turns.items()}
 
 
 def turning_volumes(
@@ -176,11 +176,11 @@ def turning_volumes(
             elif vehicle.category == Category.BICYCLE:
                 bicycles.update(vehicle.turns)
     hours = (end - begin) / HOUR
-    found = {
+    volumes = {
         turn: TurnVolume(every[turn] / hours, heavy[turn] / hours, bicycles[turn] / hours)
         for turn in sorted(every)
     }
-    return Volumes(begin, end, found)
+    return Volumes(begin, end, volumes)
 
 
 def _busiest_hour(vehicles: Sequence[PlannedVehicle], duration: float) -> float:

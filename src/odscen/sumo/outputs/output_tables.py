@@ -264,10 +264,10 @@ def _empty_measures() -> pl.LazyFrame:
 
 @cache
 def _emission_columns() -> tuple[pl.Expr, ...]:
-    return tuple(map(_in_units, EMISSIONS))
+    return tuple(map(_convert_units, EMISSIONS))
 
 
-def _in_units(name: str) -> pl.Expr:
+def _convert_units(name: str) -> pl.Expr:
     import polars as pl
 
     factor = 1.0 if name == "electricity" else 1e-3
@@ -358,10 +358,10 @@ def logged_trips(tripinfo: Path, parked: Mapping[str, ParkedCar]) -> Iterator[tu
 
 def _drive_row(trip: Any, car: ParkedCar | None) -> tuple[Any, ...]:
     value = trip.get
-    depart, arrival = float(value("depart")), _known_number(value("arrival"))
+    depart, arrival = float(value("depart")), _read_known_number(value("arrival"))
     duration = float(value("duration"))
     if car is not None:
-        depart, arrival, duration = _between_stays(trip, car, depart, arrival, duration)
+        depart, arrival, duration = _time_between_stays(trip, car, depart, arrival, duration)
     return (
         value("id"),
         False,
@@ -375,7 +375,7 @@ def _drive_row(trip: Any, car: ParkedCar | None) -> tuple[Any, ...]:
     )
 
 
-def _between_stays(
+def _time_between_stays(
     trip: Any, car: ParkedCar, depart: float, arrival: float | None, duration: float
 ) -> tuple[float, float | None, float]:
     """Departure, arrival and duration from leaving a parking place to taking one."""
@@ -392,22 +392,22 @@ def _between_stays(
 def _walk_row(person: Any) -> tuple[Any, ...]:
     """Of a person with one walk, as all of ours."""
     walk = person.find("walk")
-    arrival = None if walk is None else _known_number(walk.get("arrival"))
+    arrival = None if walk is None else _read_known_number(walk.get("arrival"))
     source = person if walk is None else walk
     return (
         person.get("id"),
         True,
         float(person.get("depart")),
         arrival,
-        _known_number(source.get("duration")),
-        None if walk is None else _known_number(walk.get("routeLength")),
+        _read_known_number(source.get("duration")),
+        None if walk is None else _read_known_number(walk.get("routeLength")),
         float(person.get("waitingTime")),
         None,
         None if arrival is None else float(person.get("timeLoss")),
     )
 
 
-def _known_number(text: str) -> float | None:
+def _read_known_number(text: str) -> float | None:
     """SUMO writes -1 for what is not known."""
     value = float(text)
     return None if value < 0.0 else value
@@ -630,15 +630,15 @@ def tidy_positions(folder: Path, run: Path) -> None:
     places = run / LANE_PLACES_FILE
     if positions.is_file() and lanes.is_file() and places.is_file():
         try:
-            found = part_sums(
+            sums = part_sums(
                 pl.scan_parquet(positions),
                 LanePlaces.from_json(places.read_text(encoding="utf-8")),
                 pl.read_parquet(lanes, columns=list(INTERVAL)).unique().sort("begin"),
             )
         except pl.exceptions.PolarsError as error:
             raise _torn_file_error(error) from error
-        if found is not None and found.height:
-            found.write_parquet(folder / LANE_SEGMENTS_FILE)
+        if sums is not None and sums.height:
+            sums.write_parquet(folder / LANE_SEGMENTS_FILE)
     positions.unlink(missing_ok=True)
 
 

@@ -75,10 +75,10 @@ def tidy_signals(folder: Path) -> None:
 
 
 def _call_logs(folder: Path) -> list[Path]:
-    found: list[Path] = []
-    while (file := folder / calls_file(len(found))).is_file():
-        found.append(file)
-    return found
+    files: list[Path] = []
+    while (file := folder / calls_file(len(files))).is_file():
+        files.append(file)
+    return files
 
 
 def _read_calls(file: Path) -> Iterator[tuple[str, float, float]]:

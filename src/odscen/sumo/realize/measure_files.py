@@ -30,10 +30,10 @@ def interval_of(
     ``analysed`` are times that figures begin at or are given over: whole multiples of it.
     """
     fine = (value for value in INTERVALS if until / value <= MOST_INTERVALS)
-    found = min(next(fine, INTERVALS[-1]), slice_length or until)
-    if all(math.isclose(value % found, 0.0, abs_tol=1e-6) for value in analysed):
-        return found
-    return float(math.gcd(round(found), *(round(value) for value in analysed)))
+    interval = min(next(fine, INTERVALS[-1]), slice_length or until)
+    if all(math.isclose(value % interval, 0.0, abs_tol=1e-6) for value in analysed):
+        return interval
+    return float(math.gcd(round(interval), *(round(value) for value in analysed)))
 
 
 def measures_xml(

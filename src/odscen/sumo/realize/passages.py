@@ -165,7 +165,8 @@ class _SegmentFiller:
     def __init__(self, graph: MapGraph) -> None:
         row = {str(name): index for index, name in enumerate(graph.segments.ids)}
         self._onwards = {
-            row[one]: {row[other] for other in others} for one, others in transitions(graph).items()
+            row[segment]: {row[other] for other in others}
+            for segment, others in transitions(graph).items()
         }
         self._known: dict[tuple[int, int], tuple[int, ...]] = {}
 
@@ -224,7 +225,7 @@ def _segment_of_lane(sumo_map: SumoMap) -> dict[str, int]:
     kinds = np.array(sumo_map.graph.segments.kinds)
     internal = np.array([sumo_map.net.lanes[name].internal for name in places.lanes])
     inside = internal[unique[:, 0]] & (kinds[unique[:, 1]] == "junction")
-    found: dict[str, int] = {}
+    segment_by_lane: dict[str, int] = {}
     for row in np.lexsort((number, inside)).tolist():
-        found[places.lanes[unique[row, 0]]] = int(unique[row, 1])
-    return found
+        segment_by_lane[places.lanes[unique[row, 0]]] = int(unique[row, 1])
+    return segment_by_lane

@@ -134,7 +134,7 @@ def project_files(
         with in_file(file.name):
             text = file.text
             root = read_xml(text, huge=True)
-            texts[name] = _made_harmless(root, text)
+            texts[name] = _neutralise_paths(root, text)
             roots.append((file, root))
     # Additional files come first in SUMO, so types and routes of any file are known to all.
     for _, root in roots:
@@ -170,7 +170,7 @@ def lights_in_force(project: SumoProject, lights: Sequence[SumoLight]) -> tuple[
         plans = {waut.get("id"): waut.get("startProg", "") for waut in root.iterchildren("WAUT")}
         for at in root.iterchildren("wautJunction"):
             starts[at.get("junctionID", "")] = plans.get(at.get("wautID"), "")
-    found = []
+    running_lights = []
     for light in lights:
         own = programs.get(light.id, [])
         start = [logic for logic in own if logic.get("programID", "0") == starts.get(light.id)]
@@ -191,8 +191,8 @@ def lights_in_force(project: SumoProject, lights: Sequence[SumoLight]) -> tuple[
             )
             offset = _read_number(logic.get("offset")) or 0.0
             light = light._replace(phases=phases, offset=offset)  # noqa: PLW2901
-        found.append(light)
-    return tuple(found)
+        running_lights.append(light)
+    return tuple(running_lights)
 
 
 def _phase_bounds(phase: etree._Element) -> tuple[float, float]:
@@ -219,7 +219,7 @@ def _free_names(files: Sequence[SumoFile], taken: set[str]) -> list[str]:
     return names
 
 
-def _made_harmless(root: etree._Element, text: str) -> str:
+def _neutralise_paths(root: etree._Element, text: str) -> str:
     """The text, unless it names files elsewhere: these are then beside it."""
     changed = False
     for element in root.iter():
@@ -301,7 +301,7 @@ class _UserReader:
         SUMO reads route files on the way, and ignores whoever would depart before the one that
         stands before it.
         """
-        for element in self._taken_users(root, file, sorted_only=sorted_only):
+        for element in self._read_users(root, file, sorted_only=sorted_only):
             if len(self._actors) >= MOST_LISTED:
                 self.notes.append(f"only the first {MOST_LISTED} road users are in the plan")
                 return
@@ -326,7 +326,7 @@ class _UserReader:
                 f"{self._begin:g} s, {self._early[0]!r} the first"
             )
 
-    def _taken_users(
+    def _read_users(
         self, root: etree._Element, file: str, *, sorted_only: bool
     ) -> Iterator[etree._Element]:
         """Vehicles, flows and persons of a file without those that SUMO ignores, who are noted."""

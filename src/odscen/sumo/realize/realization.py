@@ -353,17 +353,17 @@ def all_road_users(
     refuse_too_many(expected_users(scenario, until=until))
     users = road_users(scenario, sumo_map.graph, region, until=until)
     if scenario.transit.lines:
-        users = _in_order((*users, *line_users(scenario, region, until=until)))
+        users = _sort_users((*users, *line_users(scenario, region, until=until)))
     if not scenario.demand.parts:
         return users, []
     usable = usable_places(sumo_map)
     parks = scenario.demand.parking.used
     parking = ParkingOfTrips(scenario, sumo_map, region) if parks else None
     more, unmet = demand_users(scenario, region, usable, users, until=until, parking=parking)
-    return _in_order((*users, *more)), unmet
+    return _sort_users((*users, *more)), unmet
 
 
-def _in_order(users: Iterable[RoadUser]) -> tuple[RoadUser, ...]:
+def _sort_users(users: Iterable[RoadUser]) -> tuple[RoadUser, ...]:
     return tuple(sorted(users, key=lambda user: (user.depart, user.id)))
 
 

@@ -75,28 +75,29 @@ class RoadNet:
     @cached_property
     def edge_lanes(self) -> dict[str, tuple[RoadNetLane, ...]]:
         """Lanes of each edge, by index."""
-        found: dict[str, list[RoadNetLane]] = {}
+        road_net_lanes: dict[str, list[RoadNetLane]] = {}
         for lane in self.lanes.values():
-            found.setdefault(lane.edge, []).append(lane)
+            road_net_lanes.setdefault(lane.edge, []).append(lane)
         return {
-            edge: tuple(sorted(lanes, key=lambda lane: lane.index)) for edge, lanes in found.items()
+            edge: tuple(sorted(lanes, key=lambda lane: lane.index))
+            for edge, lanes in road_net_lanes.items()
         }
 
     @cached_property
     def links_from(self) -> dict[str, tuple[Link, ...]]:
         """Links that leave each lane."""
-        found: dict[str, list[Link]] = {}
+        links_by_lane: dict[str, list[Link]] = {}
         for link in self.links:
-            found.setdefault(link.source, []).append(link)
-        return {lane: tuple(links) for lane, links in found.items()}
+            links_by_lane.setdefault(link.source, []).append(link)
+        return {lane: tuple(links) for lane, links in links_by_lane.items()}
 
     @cached_property
     def links_to(self) -> dict[str, tuple[Link, ...]]:
         """Links that lead onto each lane, from internal lanes where there are such."""
-        found: dict[str, list[Link]] = {}
+        links_by_lane: dict[str, list[Link]] = {}
         for link in self.links:
-            found.setdefault(link.via or link.target, []).append(link)
-        return {lane: tuple(links) for lane, links in found.items()}
+            links_by_lane.setdefault(link.via or link.target, []).append(link)
+        return {lane: tuple(links) for lane, links in links_by_lane.items()}
 
     def followers(self, edge: str, vclass: str) -> tuple[str, ...]:
         """Edges that one can drive to from ``edge``, sorted."""
@@ -124,11 +125,11 @@ class RoadNet:
 
     @cached_property
     def _walk_neighbours(self) -> dict[str, tuple[str, ...]]:
-        found: dict[str, set[str]] = {}
+        neighbours: dict[str, set[str]] = {}
         for one, other in self.walk_links:
-            found.setdefault(one, set()).add(other)
-            found.setdefault(other, set()).add(one)
-        return {edge: tuple(sorted(others)) for edge, others in found.items()}
+            neighbours.setdefault(one, set()).add(other)
+            neighbours.setdefault(other, set()).add(one)
+        return {edge: tuple(sorted(others)) for edge, others in neighbours.items()}
 
     def walked_lane(self, edge: str) -> RoadNetLane | None:
         """Return the one lane of an edge on which SUMO's pedestrians walk: the outermost."""
@@ -248,10 +249,10 @@ class RoadNet:
     @cached_property
     def _edges_into_junctions(self) -> dict[str, tuple[str, ...]]:
         """Edges that lead to each junction."""
-        found: dict[str, list[str]] = {}
+        edges_by_junction: dict[str, list[str]] = {}
         for edge, (_, junction) in self.ends.items():
-            found.setdefault(junction, []).append(edge)
-        return {junction: tuple(edges) for junction, edges in found.items()}
+            edges_by_junction.setdefault(junction, []).append(edge)
+        return {junction: tuple(edges) for junction, edges in edges_by_junction.items()}
 
     @cached_property
     def _targets_of_edges(self) -> dict[str, frozenset[str]]:

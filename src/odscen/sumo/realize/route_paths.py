@@ -77,7 +77,7 @@ def each_path(
         else:
             for router in (drivable, region.router):
                 rest = {index: goal for index, goal in goals.items() if index not in paths}
-                paths |= _from_spawn(spawn, rest, bodies, router, leads)
+                paths |= _find_paths_from_spawn(spawn, rest, bodies, router, leads)
         for index in group:
             path = paths.get(index, _NOWHERE)
             routers = (region.walk_router,) if person else (drivable, region.router)
@@ -101,7 +101,7 @@ def _paths_of_trips(
         for first in range(0, len(group), TOGETHER):
             part = group[first : first + TOGETHER]
             begun = [[_LeadPath((users[index].spawn,), 0.0, 0.0)] for index in part]
-            yield from zip(part, _to_goal(goal, begun, there), strict=True)
+            yield from zip(part, _find_paths_to_goal(goal, begun, there), strict=True)
 
 
 class CostRouter:
@@ -132,7 +132,7 @@ class CostRouter:
             begun = [
                 self._leads.of(spawns[index], bodies[index], self._router.mask) for index in part
             ]
-            yield from zip(part, _to_goal(goal, begun, there), strict=True)
+            yield from zip(part, _find_paths_to_goal(goal, begun, there), strict=True)
 
     def path_over(
         self, spawn: int, body: Body, places: Sequence[Int32Array], goal: int
@@ -154,13 +154,13 @@ class CostRouter:
                 nearest = int(np.argmin(ahead))
                 if not math.isfinite(ahead[nearest]):
                     break
-                path = _joined_paths(path, self._router.path(int(path[-1]), int(inside[nearest])))
+                path = _join_paths(path, self._router.path(int(path[-1]), int(inside[nearest])))
             else:
                 return path
         return _NOWHERE
 
 
-def _joined_paths(one: Int32Array, other: Int32Array) -> Int32Array:
+def _join_paths(one: Int32Array, other: Int32Array) -> Int32Array:
     return np.concatenate([one, other[1:]])
 
 
@@ -176,7 +176,7 @@ def _path_through(
         further = next((array for array in found if len(array)), _NOWHERE)
         if not len(further):
             return _NOWHERE
-        path = _joined_paths(path, further)
+        path = _join_paths(path, further)
     return path
 
 
@@ -200,12 +200,12 @@ class _LeadPaths:
     def of(self, spawn: int, body: Body, mask: BoolArray) -> list[_LeadPath]:
         """Straight paths of a vehicle that departs, inside the mask, and last the spawn alone."""
         least = body.length / 2.0 + LANE_CHANGE
-        found: list[_LeadPath] = []
+        paths: list[_LeadPath] = []
         open_ = [_LeadPath((spawn,), 0.0, 0.0)]
         while open_:
             lead = open_.pop()
             if lead.metres >= least:
-                found.append(lead)
+                paths.append(lead)
                 continue
             first, end = self._first[lead.nodes[-1] : lead.nodes[-1] + 2].tolist()
             open_ += [
@@ -217,10 +217,10 @@ class _LeadPaths:
                 for k in range(first, end)
                 if mask[self._target[k]]
             ]
-        return [*found, _LeadPath((spawn,), 0.0, 0.0)]
+        return [*paths, _LeadPath((spawn,), 0.0, 0.0)]
 
 
-def _from_spawn(
+def _find_paths_from_spawn(
     spawn: int,
     goals: Mapping[int, int],
     bodies: Sequence[Body],
@@ -246,7 +246,9 @@ def _from_spawn(
     return {index: path for index, path in paths.items() if len(path)}
 
 
-def _to_goal(goal: int, begun: Sequence[Sequence[_LeadPath]], there: PathsTo) -> list[Int32Array]:
+def _find_paths_to_goal(
+    goal: int, begun: Sequence[Sequence[_LeadPath]], there: PathsTo
+) -> list[Int32Array]:
     """Ways of trips to one goal; empty where there is none."""
     ends = [lead.nodes[-1] for leads in begun for lead in leads[:-1]]
     costs = iter(there.distance(np.array(ends, dtype=np.int32)).tolist())

@@ -157,8 +157,8 @@ class RoutePlanner:
         ahead = (length / 2.0 + longitudinal_offset) * self._places.scales[start.id]
         pos = max(pos, -ahead)  # a front behind the beginning of its lane is on none
         if pos + ahead > start.length + CLAMP and not self._next_lanes(start, edges):
-            edges, told = self._leave_along_link(start, edges, vclass)
-            repairs += told
+            edges, more_repairs = self._leave_along_link(start, edges, vclass)
+            repairs += more_repairs
         edges, lane, front = self._place_front(edges, start, pos + ahead)
         if not lane.allows(vclass):
             raise NoRouteError(f"lane {lane.id} of the SUMO network does not admit {vclass}")
@@ -217,12 +217,12 @@ class RoutePlanner:
             raise NoRouteError("the SUMO network has no lane at the spawn")
         lane = self._net.lanes[place[0]]
         if lane.internal:
-            return self._from_inside(lane, edges, vclass), lane, place[1]
+            return self._prepend_internal_edges(lane, edges, vclass), lane, place[1]
         if lane.edge == edges[0]:
             return edges, lane, place[1]
         raise NoRouteError(f"the SUMO network has no way from lane {lane.id} for {vclass}")
 
-    def _from_inside(
+    def _prepend_internal_edges(
         self, lane: RoadNetLane, edges: tuple[str, ...], vclass: str
     ) -> tuple[str, ...]:
         """Put the internal edges before ``edges`` that lead there from an internal lane."""

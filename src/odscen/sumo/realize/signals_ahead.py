@@ -64,11 +64,11 @@ def lights_at_start(sumo_map: SumoMap, signals: Signals = AS_THE_MAP) -> LightVi
     for light in sumo_map.lights:
         names = (light.id, *map(str, light.junctions))
         offset = next((offsets[name] for name in names if name in offsets), light.offset)
-        logs[light.id] = _before_start(light, offset)
+        logs[light.id] = _log_cycle_before_start(light, offset)
     return lights_at(sumo_map, logs, 0.0)
 
 
-def _before_start(light: SumoLight, offset: float) -> LightLog:
+def _log_cycle_before_start(light: SumoLight, offset: float) -> LightLog:
     """States of one cycle up to second 0, and what is shown then.
 
     SUMO's programs are at ``time - offset`` of their cycle.
@@ -88,12 +88,12 @@ def _before_start(light: SumoLight, offset: float) -> LightLog:
 def _lit_lanes(sumo_map: SumoMap, light: SumoLight) -> Iterable[_LitLane]:
     """Lanes of the lane graph whose end is at a stop line of the light."""
     rows = {str(key): row for row, key in enumerate(sumo_map.graph.lanes.lanes.keys)}
-    found: dict[int, list[int]] = {}
+    lit_lanes: dict[int, list[int]] = {}
     for place, link in enumerate(light.links):
         row = rows.get(sumo_map.lane_names.get(link.source, ""))
         if row is not None:
-            found.setdefault(row, []).append(place)
-    return [_LitLane(row, tuple(links)) for row, links in found.items()]
+            lit_lanes.setdefault(row, []).append(place)
+    return [_LitLane(row, tuple(links)) for row, links in lit_lanes.items()]
 
 
 def _signal_seen(state: str, links: Sequence[int]) -> SignalAhead:

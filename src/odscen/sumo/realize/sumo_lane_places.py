@@ -122,8 +122,11 @@ def _parts_of_lanes(
         if lane.internal and crossed:
             yield lane.id, (_SegmentShare(max(crossed, key=crossed.count), 1.0),)
         else:
-            found = [(name, len(list(same))) for name, same in groupby(names)]
-            yield lane.id, tuple(_SegmentShare(name, number / len(names)) for name, number in found)
+            counts = [(name, len(list(same))) for name, same in groupby(names)]
+            yield (
+                lane.id,
+                tuple(_SegmentShare(name, number / len(names)) for name, number in counts),
+            )
 
 
 def _places_beside(parts: _Parts, net: RoadNet) -> _Parts:
@@ -133,14 +136,14 @@ def _places_beside(parts: _Parts, net: RoadNet) -> _Parts:
         for lanes in net.edge_lanes.values()
         if (beside := next((parts[lane.id] for lane in lanes if lane.id in parts), None))
         for lane in lanes
-        if lane.id not in parts and not lane.internal and _for_vehicles(lane)
+        if lane.id not in parts and not lane.internal and _admits_vehicles(lane)
     }
 
 
 def _lane_chains(net: RoadNet) -> Iterator[_LaneChain]:
     for link in net.links:
         source = net.lanes[link.source]
-        if source.internal or not _for_vehicles(source):
+        if source.internal or not _admits_vehicles(source):
             continue
         if link.via is None:
             yield _LaneChain(source, (), net.lanes[link.target])
@@ -165,17 +168,17 @@ def _places_inside(
     for source, inside, _ in chains:
         for own in filter(None, map(crossed, inside)):
             at_node.setdefault(net.ends[source.edge][1], own)
-    found: _Parts = {}
+    parts_by_lane: _Parts = {}
     for source, inside, _ in chains:
         first = next(filter(None, map(crossed, inside)), None)
         other = first or at_node.get(net.ends[source.edge][1])
         for lane in inside:
             if crossed(lane) is None and (first is not None or lane.id not in parts):
                 if other is not None:
-                    found[lane.id] = (_SegmentShare(other, 1.0),)
+                    parts_by_lane[lane.id] = (_SegmentShare(other, 1.0),)
                 elif source.id in parts:
-                    found[lane.id] = (_SegmentShare(parts[source.id][-1].segment, 1.0),)
-    return found
+                    parts_by_lane[lane.id] = (_SegmentShare(parts[source.id][-1].segment, 1.0),)
+    return parts_by_lane
 
 
 def _junction_paths(
@@ -194,12 +197,12 @@ def _junction_controls(sumo_map: SumoMap) -> dict[str, JunctionControl]:
     """How each junction is controlled, by its segment."""
     graph = sumo_map.graph
     lit = {name for light in sumo_map.lights for name in light.junctions}
-    found: dict[str, JunctionControl] = {}
+    controls: dict[str, JunctionControl] = {}
     for lane, segment in np.unique(np.stack([graph.lanes.lane, graph.lanes.segment]), axis=1).T:
         junction = graph.lanes.lanes.junctions[lane]
         if junction is not None:
-            found[str(graph.segments.ids[segment])] = "signal" if junction in lit else "priority"
-    return found
+            controls[str(graph.segments.ids[segment])] = "signal" if junction in lit else "priority"
+    return controls
 
 
 def _lane_rows(parts: _Parts, net: RoadNet) -> Iterator[tuple[str, float, bool, str, float, bool]]:
@@ -209,7 +212,7 @@ def _lane_rows(parts: _Parts, net: RoadNet) -> Iterator[tuple[str, float, bool, 
             onto = net.lanes[link.via or link.target]
             before[onto.edge].add(parts[link.source][-1].segment)
     for name, lane in sorted(net.lanes.items()):
-        if _for_vehicles(lane):
+        if _admits_vehicles(lane):
             motor = lane.allowed is None or not lane.allowed <= _NO_MOTOR
             for number, part in enumerate(parts.get(name, ())):
                 entry = number > 0 or bool(before[lane.edge] - {part.segment})
@@ -235,7 +238,7 @@ def _connection_rows(
     ahead = {connection.source.edge: connection.junction for connection in reversed(connections)}
     for edge, last in sorted(_last_edges(ahead, inside, net).items()):
         for lane in net.edge_lanes[edge]:
-            if _for_vehicles(lane):
+            if _admits_vehicles(lane):
                 yield lane.id, ahead[last], last, None, None, None
 
 
@@ -251,15 +254,15 @@ def _last_edges(
         onto = net.lanes[link.via or link.target]
         if not {link.source, onto.id} & inside.keys():
             before[onto.edge].add(net.lanes[link.source].edge)
-    found = {edge: edge for edge in sorted(ahead)}
-    todo = deque(found)
+    last_edges = {edge: edge for edge in sorted(ahead)}
+    todo = deque(last_edges)
     while todo:
         edge = todo.popleft()
         for previous in sorted(before[edge]):
-            if previous not in found:
-                found[previous] = found[edge]
+            if previous not in last_edges:
+                last_edges[previous] = last_edges[edge]
                 todo.append(previous)
-    return found
+    return last_edges
 
 
 def _segment_rows(parts: _Parts, sumo_map: SumoMap) -> Iterator[tuple[str, float]]:
@@ -267,7 +270,7 @@ def _segment_rows(parts: _Parts, sumo_map: SumoMap) -> Iterator[tuple[str, float
     segments = sumo_map.graph.segments
     total: dict[str, float] = defaultdict(float)
     for lanes in sumo_map.net.edge_lanes.values():
-        driven = [lane for lane in lanes if lane.id in parts and _for_vehicles(lane)]
+        driven = [lane for lane in lanes if lane.id in parts and _admits_vehicles(lane)]
         for lane in driven:
             for part in parts[lane.id]:
                 total[part.segment] += part.share * lane.length / len(driven)
@@ -278,5 +281,5 @@ def _segment_rows(parts: _Parts, sumo_map: SumoMap) -> Iterator[tuple[str, float
             yield name, total[name] / max(1, round(total[name] / length))
 
 
-def _for_vehicles(lane: RoadNetLane) -> bool:
+def _admits_vehicles(lane: RoadNetLane) -> bool:
     return lane.allowed != _ONLY_WALKERS

@@ -113,7 +113,7 @@ class SumoMap:
             graph=graph,
             net=net,
             lane_places=with_gaps(places, lanes, net),
-            walk_places=_all_scaled(
+            walk_places=_fill_scales(
                 _node_positions(table, walk_keys, walks.lane, walks.s, walks.x, walks.y)
             ),
             net_offset=table.net_offset,
@@ -189,10 +189,10 @@ def with_gaps(places: NodePositions, graph: LaneGraph, net: RoadNet) -> NodePosi
         rows = [row_of[lane.id] for lane in inside]
         if rows and np.all(np.isnan(scale[rows])):
             scale[rows] = max(length, NOTHING) / max(ground, NOTHING)
-    return _all_scaled(replace(places, scale=scale))
+    return _fill_scales(replace(places, scale=scale))
 
 
-def _all_scaled(places: NodePositions) -> NodePositions:
+def _fill_scales(places: NodePositions) -> NodePositions:
     return replace(places, scale=np.where(np.isnan(places.scale), 1.0, places.scale))
 
 
@@ -239,7 +239,7 @@ def _walk_links(table: LaneTable) -> frozenset[tuple[str, str]]:
     A SUMO walk names normal edges only; what lies between them at a junction SUMO finds itself.
     """
     normal = {edge.id for edge in table.edges.values() if edge.function == NORMAL}
-    found: set[tuple[str, str]] = set()
+    walk_links: set[tuple[str, str]] = set()
     for start in sorted(normal & table.walk_neighbours.keys()):
         todo, seen = [start], {start}
         while todo:
@@ -248,7 +248,7 @@ def _walk_links(table: LaneTable) -> frozenset[tuple[str, str]]:
                     continue
                 seen.add(other)
                 if other in normal:
-                    found.add((start, other))
+                    walk_links.add((start, other))
                 else:
                     todo.append(other)
-    return frozenset(found)
+    return frozenset(walk_links)

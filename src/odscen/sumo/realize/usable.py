@@ -47,17 +47,19 @@ def usable_places(sumo_map: SumoMap) -> Usable:
     exact = (
         admitted
         & _mask_of_near(sumo_map.lane_places)
-        & ~_at_dead_end(sumo_map, sumo_map.lane_places)
+        & ~_mask_of_dead_ends(sumo_map, sumo_map.lane_places)
     )
     reach = int(np.ceil(REACH / lanes.spacing))
-    walked = _of_lanes(
+    walked = _array_by_lane(
         not lane.internal and sumo_map.net.walked_lane(lane.edge) is lane
         for lane in _lanes_of_places(sumo_map, sumo_map.walk_places)
     )
-    inside = _of_lanes(lane.internal for lane in _lanes_of_places(sumo_map, sumo_map.lane_places))
+    inside = _array_by_lane(
+        lane.internal for lane in _lanes_of_places(sumo_map, sumo_map.lane_places)
+    )
     on_foot = _mask_of_admitted(sumo_map, sumo_map.walk_places, PEDESTRIAN)
     on_foot &= walked[sumo_map.walk_places.lane] & _mask_of_near(sumo_map.walk_places)
-    spawnable = _all_around(exact, lanes, reach)
+    spawnable = _erode_along_lanes(exact, lanes, reach)
     barred = {
         category: ~_mask_of_admitted(sumo_map, sumo_map.lane_places, traits.vclass)
         for category, traits in KINDS.items()
@@ -76,21 +78,21 @@ def _lanes_of_places(sumo_map: SumoMap, places: NodePositions) -> list[RoadNetLa
     return [sumo_map.net.lanes[name] for name in places.lanes]
 
 
-def _of_lanes(values: Iterable[bool]) -> BoolArray:
+def _array_by_lane(values: Iterable[bool]) -> BoolArray:
     """One value for each lane; the last one, at -1, is of nodes that are on no lane."""
     return np.array([*values, False], dtype=np.bool_)
 
 
 def _mask_of_admitted(sumo_map: SumoMap, places: NodePositions, vclass: str) -> BoolArray:
     """Nodes on a SUMO lane that a vehicle class may use, shape ``(N,)``."""
-    allowed = _of_lanes(lane.allows(vclass) for lane in _lanes_of_places(sumo_map, places))
+    allowed = _array_by_lane(lane.allows(vclass) for lane in _lanes_of_places(sumo_map, places))
     return (places.lane >= 0) & allowed[places.lane]
 
 
-def _at_dead_end(sumo_map: SumoMap, places: NodePositions) -> BoolArray:
+def _mask_of_dead_ends(sumo_map: SumoMap, places: NodePositions) -> BoolArray:
     """Nodes close to the end of a SUMO lane without links: a front could not reach over it."""
     lanes = _lanes_of_places(sumo_map, places)
-    dead = _of_lanes(not sumo_map.net.links_from.get(lane.id) for lane in lanes)
+    dead = _array_by_lane(not sumo_map.net.links_from.get(lane.id) for lane in lanes)
     length = np.array([*(lane.length for lane in lanes), np.inf])
     return dead[places.lane] & (places.pos > length[places.lane] - REACH)
 
@@ -99,7 +101,7 @@ def _mask_of_near(places: NodePositions) -> BoolArray:
     return np.less_equal(places.deviation, DEVIATION)  # false for NaN
 
 
-def _all_around(good: BoolArray, lanes: LaneGraph, steps: int) -> BoolArray:
+def _erode_along_lanes(good: BoolArray, lanes: LaneGraph, steps: int) -> BoolArray:
     """Nodes that are good, with everything up to ``steps`` successors or predecessors away."""
     follows = lanes.relation == Relation.SUCCESSOR
     source, target = lanes.source[follows], lanes.target[follows]

@@ -94,17 +94,17 @@ class Diversions:
         ]
 
     def _begun_and_ended(self, begin: float, end: float) -> list[Event]:
-        found = []
+        events = []
         for measure in self._measures:
             if begin <= measure.end < end and measure.end < self._last:
-                found.append(
+                events.append(
                     Event(measure.end, EventKind.MEASURE_END, measure.id, detail=measure.words)
                 )
             if begin <= measure.begin < end:
-                found.append(
+                events.append(
                     Event(measure.begin, EventKind.MEASURE_BEGIN, measure.id, detail=measure.words)
                 )
-        return sorted(found, key=lambda event: event.time)
+        return sorted(events, key=lambda event: event.time)
 
     def _update_closed(self, end: float) -> None:
         """Know what is closed in the step that ends at ``end``."""

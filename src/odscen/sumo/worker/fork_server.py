@@ -9,7 +9,8 @@ yields inside a junction depends on the order of addresses in memory.)
 Stdin is a Unix socket. Each message on it is a JSON object ``{"plan": FILE, "cwd": FOLDER,
 "raw": BOOL}`` with descriptors: one to say ``pid N`` on, and later ``exit N``; stdout; stderr; then
 those to hold open. With ``raw`` tables may be left to be made.
-The process ends when the socket is closed, or when it has had nothing to do for a minute.
+The process ends when the socket is closed, or when it has had nothing to do for a minute, or as
+many seconds as its argument says.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ def main() -> None:
     gc.collect()
     gc.freeze()  # forked processes need not go through it, nor copy it
     gc.enable()
-    with socket.socket(fileno=0) as control, _Children() as children:
+    idle = float(sys.argv[1]) if sys.argv[1:] else IDLE
+    with socket.socket(fileno=0) as control, _Children(idle) as children:
         while children.wait(control):
             data, descriptors, *_ = socket.recv_fds(control, _MOST_BYTES, MOST_DESCRIPTORS)
             if not data:
@@ -54,7 +56,8 @@ def main() -> None:
 class _Children:
     """The forked processes, and what to say of their ends."""
 
-    def __init__(self) -> None:
+    def __init__(self, idle: float) -> None:
+        self._idle = idle
         self._said_to: dict[int, int] = {}
         self._ended, self._wake = os.pipe()
         os.set_blocking(self._ended, False)
@@ -74,7 +77,7 @@ class _Children:
             selector.register(control, selectors.EVENT_READ)
             selector.register(self._ended, selectors.EVENT_READ)
             while True:
-                ready = [key.fileobj for key, _ in selector.select(IDLE)]
+                ready = [key.fileobj for key, _ in selector.select(self._idle)]
                 if self._ended in ready:
                     with suppress(BlockingIOError):
                         os.read(self._ended, _MOST_BYTES)

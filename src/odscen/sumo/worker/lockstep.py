@@ -82,7 +82,9 @@ class LockstepWatch:
         self._steps = 0
         self._reported = 0
         self._lights: dict[str, str] = {}
+        self._seen: tuple[float, np.ndarray] | None = None
         self._lane: dict[str, int] = {"": -1}
+        self._told_lanes = 1
 
     @property
     def drives(self) -> bool:
@@ -113,22 +115,21 @@ class LockstepWatch:
         """Tell of the last step."""
         self.show(session, recorder)
 
+    def look(self, session: Session) -> None:
+        """See where all are before rules act on the step: who vanishes then was there in it.
+
+        One that is added then, or a person whose walk is changed, is elsewhere for SUMO at once.
+        """
+        self._seen = session.time, self._rows_of(session)
+
     def show(self, session: Session, recorder: Recorder) -> None:
         """Report the step just made; there is nothing to report before the first."""
-        import numpy as np
-
         if not self._steps:
             return
-        known = len(self._lane) - 1
-        vehicles, persons = session.vehicle_poses(), session.person_poses()
-        doors = session.stop_doors.signals(vehicles.ids, session.time)
-        vehicles = vehicles._replace(signals=vehicles.signals | doors)
-        rows = np.concatenate(
-            [
-                self._rows_to_send(vehicles, session.vehicle_places(vehicles.ids)),
-                self._rows_to_send(persons, session.person_places(persons.ids)),
-            ]
-        ).tobytes()
+        if self._seen is None or self._seen[0] != session.time:
+            self.look(session)
+        assert self._seen is not None
+        rows = self._seen[1].tobytes()
         states = session.light_states()
         changed = {name: state for name, state in states.items() if self._lights.get(name) != state}
         self._lights = states
@@ -137,12 +138,26 @@ class LockstepWatch:
             size=len(rows),
             time=session.time - self._step_length,
             lights=changed,
-            lanes=list(self._lane)[known + 1 :],
+            lanes=list(self._lane)[self._told_lanes :],
             departed=recorder.departed,
             arrived=recorder.arrived,
             incidents=[event_row(event) for event in events if event.kind not in _PLAIN],
         )
+        self._told_lanes = len(self._lane)
         self._send(state, rows)
+
+    def _rows_of(self, session: Session) -> np.ndarray:
+        import numpy as np
+
+        vehicles, persons = session.vehicle_poses(), session.person_poses()
+        doors = session.stop_doors.signals(vehicles.ids, session.time)
+        vehicles = vehicles._replace(signals=vehicles.signals | doors)
+        return np.concatenate(
+            [
+                self._rows_to_send(vehicles, session.vehicle_places(vehicles.ids)),
+                self._rows_to_send(persons, session.person_places(persons.ids)),
+            ]
+        )
 
     def _rows_to_send(self, poses: Poses, places: list[tuple[str, float]]) -> np.ndarray:
         import numpy as np

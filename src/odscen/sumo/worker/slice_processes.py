@@ -53,11 +53,11 @@ def in_processes(how: Sequence[str], run: Callable[[Sequence[str]], End]) -> End
     """
     end = End(0, list(how))
     while end.following is not None:
-        end = _in_a_process(end.following, run)
+        end = _run_in_process(end.following, run)
     return end
 
 
-def _in_a_process(how: Sequence[str], run: Callable[[Sequence[str]], End]) -> End:
+def _run_in_process(how: Sequence[str], run: Callable[[Sequence[str]], End]) -> End:
     host = os.getpid()
     reading, writing = os.pipe()
     child = os.fork()

@@ -68,15 +68,15 @@ class Snapshots:
         """Bytes of a frame; road users who are not in the plan are not in it."""
         rows = np.concatenate(
             [
-                self._rows_of_poses(session.vehicle_poses()),
-                self._rows_of_poses(session.person_poses()),
+                self._make_rows(session.vehicle_poses()),
+                self._make_rows(session.person_poses()),
             ]
         )
         return frame_bytes(
             rows, step=step, time=time, real_time_factor=real_time_factor, arrived=arrived
         )
 
-    def _rows_of_poses(self, poses: Poses) -> np.ndarray:
+    def _make_rows(self, poses: Poses) -> np.ndarray:
         index = np.array([self._row.get(name, -1) for name in poses.ids], dtype=np.int64)
         known = (index >= 0) & (np.abs(poses.x) < 1e8)  # SUMO's INVALID_DOUBLE_VALUE, -2^30
         index = index[known]
@@ -108,7 +108,7 @@ def frame_rows(
     rows[:, 2] = y - origin[1]
     rows[:, 3] = hdg
     rows[:, 4] = speed
-    rows[:, 5] = _signal_flags(signals)
+    rows[:, 5] = _compute_flags(signals)
     return rows
 
 
@@ -120,7 +120,7 @@ def frame_bytes(
     return header.tobytes() + rows.tobytes()
 
 
-def _signal_flags(signals: np.ndarray) -> np.ndarray:
+def _compute_flags(signals: np.ndarray) -> np.ndarray:
     left = (signals & (VehicleSignal.BLINKER_LEFT | VehicleSignal.BLINKER_EMERGENCY)) > 0
     right = (signals & (VehicleSignal.BLINKER_RIGHT | VehicleSignal.BLINKER_EMERGENCY)) > 0
     brake = (signals & VehicleSignal.BRAKE) > 0

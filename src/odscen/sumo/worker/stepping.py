@@ -132,7 +132,7 @@ class Stepper:
             if self.over:
                 break
             if now >= held:
-                session.hold_lanes(but=self._moved_by_others())
+                session.hold_lanes(but=self._list_moved_by_others())
             now = self._make_step(session, now)
             if clock() - self._sent >= MESSAGE_PAUSE:
                 self._sent = clock()
@@ -164,14 +164,14 @@ class Stepper:
         if self.lights is not None:
             self.lights.before_step(session)
         if self.behaviour is not None:
-            self.behaviour.before_step(session, self._moved_by_others())
+            self.behaviour.before_step(session, self._list_moved_by_others())
         else:
-            moved = self._moved_by_others()
+            moved = self._list_moved_by_others()
             session.turning_gaps.before_step(only=self._take_gaps, moved=moved)
             session.curve_speeds.before_step(only=self._take_gaps, moved=moved)
             session.turn_exits.before_step(only=self._take_gaps, moved=moved)
             session.lateral_places.before_step(
-                only=self._take_gaps, moved=moved, placed=self._placed_by_others()
+                only=self._take_gaps, moved=moved, placed=self._list_placed_by_others()
             )
         after = session.step()
         if self.story is not None:
@@ -182,6 +182,8 @@ class Stepper:
         if self.story is not None or self._led is not None:
             self._due = now
         if self._led is None:
+            if self.story is not None and isinstance(self._watch, LockstepWatch):
+                self._watch.look(session)
             self._take_rules(session)
         self.steps += 1
         return after
@@ -196,16 +198,16 @@ class Stepper:
         else:
             self._detours = self._detours or Detours(session.lanes.links())
             detours, closed = self._detours, {}
-        moved = self._moved_by_others()
+        moved = self._list_moved_by_others()
         self.recorder.add(self._missed_lanes.before_step(session, now, detours, closed, moved))
 
-    def _moved_by_others(self) -> Collection[str]:
+    def _list_moved_by_others(self) -> Collection[str]:
         """Who is moved by rules or by another program."""
         moved = frozenset() if self.story is None else self.story.moved
         placed = self._watch.placed if isinstance(self._watch, LockstepWatch) else None
         return moved if placed is None else moved | {placed}
 
-    def _placed_by_others(self) -> Collection[str]:
+    def _list_placed_by_others(self) -> Collection[str]:
         """Who is put somewhere by rules or by another program."""
         placed = frozenset() if self.story is None else self.story.placed
         other = self._watch.placed if isinstance(self._watch, LockstepWatch) else None

@@ -119,6 +119,29 @@ def test_actuated_lights_have_bounds_that_move_with_the_green() -> None:
     assert all(low is None for name, _, low, _ in phases(logic) if "stage" not in str(name))
 
 
+def test_extended_greens_are_those_of_the_map_at_least_and_share_what_is_left_of_two_minutes() -> (
+    None
+):
+    (light,) = crossing().table.lights
+    cycle = sum(phase.duration for phase in light.phases)
+    stages = [phase for phase in light.phases if phase.most > phase.least]
+    more = round((120.0 - cycle) / len(stages), 1)
+    assert more > 10.0
+    (logic,) = logics(control="extended")
+    assert logic.get("type") == "actuated"
+    assert {row.get("key"): row.get("value") for row in logic.iterfind("param")}["max-gap"] == "2"
+    assert phases(logic) == [
+        (p.name, f"{p.duration:g}", f"{p.duration:g}", f"{p.duration + more:g}")
+        if p in stages
+        else (p.name, f"{p.duration:g}", None, None)
+        for p in light.phases
+    ]
+
+
+def test_buses_that_have_priority_prolong_greens_by_themselves() -> None:
+    assert signals_text(control="extended", bus_priority=True) == signals_text(bus_priority=True)
+
+
 @dataclass(frozen=True, eq=False)
 class Built:
     sumo: SumoMap
@@ -269,6 +292,22 @@ def test_traffic_from_one_side_gets_more_green_where_the_light_is_actuated(tmp_p
         assert len(seen) > 500
         green[control] = float(np.mean([state[way_on().link] == "G" for state in seen]))
     assert green["actuated"] > 1.3 * green["fixed"]
+
+
+@pytest.mark.slow
+def test_an_extended_green_lasts_longer_only_while_vehicles_follow_each_other(
+    tmp_path: Path,
+) -> None:
+    (light,) = crossing().table.lights
+    planned = {p.state: p.duration for p in light.phases if p.is_stage}
+    seen = [state for _, state in states(tmp_path, timed(control="extended"), until=600.0)]
+    runs = [(state, len(list(same))) for state, same in groupby(seen)][1:-1]
+    own = {state for state in planned if state[way_on().link] == "G"}
+    mine = [seconds - planned[state] for state, seconds in runs if state in own]
+    others = [seconds - planned[state] for state, seconds in runs if state in {*planned} - own]
+    assert min(mine) >= 0.0
+    assert max(mine) > 5.0
+    assert set(others) == {0.0}  # nobody comes there
 
 
 @pytest.mark.slow

@@ -109,8 +109,8 @@ class BusArea:
 
 def bus_areas(light: SumoLight, view: Light, net: RoadNet) -> tuple[BusArea, ...]:
     """One in each lane of vehicles."""
-    every = [n for n, one in enumerate(view.movements) if not one.walk]
-    lanes = _by_lane(light, every).items()
+    every = [n for n, movement in enumerate(view.movements) if not movement.walk]
+    lanes = _group_by_lane(light, every).items()
     return tuple(
         BusArea(f"{light.id}.bus.{number}", lane, movements, area_length(net, lane, BUS_AREA))
         for number, (lane, movements) in enumerate(lanes)
@@ -126,13 +126,13 @@ def area_length(net: RoadNet, lane: str, wanted: float) -> float:
     """
     todo, seen = [(net.lanes[lane].length - 2.0 * AREA_END, lane)], set[str]()
     while todo:
-        length, one = heapq.heappop(todo)
-        before = net.links_to.get(one, ())
+        length, farther = heapq.heappop(todo)
+        before = net.links_to.get(farther, ())
         if length >= wanted:
             break
         if not before or wanted - length < LEAST_REST:
             return max(math.floor(100.0 * length) / 100.0, AREA_END)
-        seen.add(one)
+        seen.add(farther)
         for link in before:
             if link.source not in seen:
                 heapq.heappush(todo, (length + net.lanes[link.source].length, link.source))
@@ -180,7 +180,7 @@ def vehicle_loops(
     loops: list[PlacedLoop] = []
     for detector in designed:
         own = detector_movements(detector.at, view.movements)
-        for lane, movements in _by_lane(light, own).items():
+        for lane, movements in _group_by_lane(light, own).items():
             loops.append(
                 _place_loop(
                     net, f"{light.id}.{detector.id}.{len(loops)}", lane, movements,
@@ -190,8 +190,8 @@ def vehicle_loops(
             )  # fmt: skip
     if designed:
         return tuple(loops)
-    every = [n for n, one in enumerate(view.movements) if one.drive]
-    for lane, movements in _by_lane(light, every).items():
+    every = [n for n, movement in enumerate(view.movements) if movement.drive]
+    for lane, movements in _group_by_lane(light, every).items():
         stages = tuple(stage for stage, some in green.items() if some & set(movements))
         if not stages:
             continue
@@ -227,11 +227,11 @@ def waiting_places(
     light: SumoLight, net: RoadNet, crossings: Mapping[str, Iterable[int]]
 ) -> tuple[PlacedLoop, ...]:
     """Where people wait who call stages; ``crossings`` are the movements that call each."""
-    found: dict[str, tuple[set[str], set[int]]] = {}
+    places: dict[str, tuple[set[str], set[int]]] = {}
     for stage, movements in crossings.items():
         for n in movements:
             for area in (light.links[n].source, light.links[n].target):
-                stages, own = found.setdefault(area, (set(), set()))
+                stages, own = places.setdefault(area, (set(), set()))
                 stages.add(stage)
                 own.add(n)
     return tuple(
@@ -239,7 +239,7 @@ def waiting_places(
             f"{light.id}.call.{number}", "", area, 0.0, net.lanes[area].length, "",
             tuple(sorted(stages)), tuple(sorted(own)),
         )
-        for number, (area, (stages, own)) in enumerate(sorted(found.items()))
+        for number, (area, (stages, own)) in enumerate(sorted(places.items()))
     )  # fmt: skip
 
 
@@ -257,11 +257,11 @@ def may_end(loops: Iterable[PlacedLoop], stage: str, green: set[int]) -> str:
     return " and ".join(parts)
 
 
-def _by_lane(light: SumoLight, movements: Iterable[int]) -> dict[str, tuple[int, ...]]:
-    found: dict[str, list[int]] = {}
+def _group_by_lane(light: SumoLight, movements: Iterable[int]) -> dict[str, tuple[int, ...]]:
+    movements_by_lane: dict[str, list[int]] = {}
     for n in movements:
-        found.setdefault(light.links[n].source, []).append(n)
-    return {lane: tuple(own) for lane, own in found.items()}
+        movements_by_lane.setdefault(light.links[n].source, []).append(n)
+    return {lane: tuple(own) for lane, own in movements_by_lane.items()}
 
 
 def _place_loop(

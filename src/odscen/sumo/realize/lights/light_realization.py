@@ -36,6 +36,7 @@ from odscen.sumo.realize.lights.stage_phases import (
     SumoPhase,
     bus_phases,
     calling_movements,
+    extended_phases,
     kept_cycle,
     kept_phases,
     plan_phases,
@@ -56,14 +57,17 @@ if TYPE_CHECKING:
     from odscen.sumo.realize.lights.light_detectors import BusArea, PlacedLoop
     from odscen.sumo.realize.sumo_map import SumoMap
 
-TYPES: dict[Control, str] = {"fixed": "static", "actuated": "actuated"}
+TYPES: dict[Control, str] = {"fixed": "static", "extended": "actuated", "actuated": "actuated"}
 """``type`` of a ``<tlLogic>``."""
 
 CONTROL_PARAM = "odscen.control"
-"""Parameter that says whether the program is meant to be fixed-time or actuated."""
+"""Parameter that says what control the program is meant to have."""
 
 STAGES_PARAM, MAP_STAGES = "odscen.stages", "map"
-"""Parameter of a program that calls the stages of the map, and its value."""
+"""Parameter of a program that calls or extends the stages of the map, and its value."""
+
+EXTENDING_GAP = 2.0
+"""Seconds between vehicles that end an extended green, as SUMO's ``max-gap``."""
 
 GROUP_PARAM = "odscen.group."
 """How parameters begin that name signal groups; their values are places in the states."""
@@ -97,8 +101,10 @@ class RealizedLight:
 
     @property
     def watched(self) -> bool:
-        """Whether SUMO runs detectors of it."""
-        return any(program.kind == "actuated" for program in self.programs)
+        """Whether SUMO runs detectors of it that are placed here."""
+        return self.shown.control != "extended" and any(
+            program.kind == "actuated" for program in self.programs
+        )
 
 
 def realized_lights(
@@ -123,17 +129,17 @@ def realized_lights(
         return _mapped_lights(sumo_map, signals.control, buses=signals.bus_priority)
     timings = {timing.junction: timing for timing in signals.junctions}
     until = scenario.simulation.duration if until is None else until
-    found = []
+    realized_lights = []
     for light, view in zip(sumo_map.lights, scenario_lights(sumo_map), strict=True):
         own = [timings[name] for name in view.names if name in timings]
         timing = own[0] if own else JunctionTiming(junction=view.names[0])
         asked = signals.bus_priority if timing.bus_priority is None else timing.bus_priority
-        control = timing.control or signals.control
+        control = signals.control_of(timing)
         realizing = _LightRealizer(light, view, timing, control, sumo_map, buses=asked)
-        found.append(
+        realized_lights.append(
             realizing.designed(scenario.demand.clock, until) if timing.stages else realizing.kept()
         )
-    return tuple(found)
+    return tuple(realized_lights)
 
 
 @lru_cache(maxsize=8)
@@ -166,6 +172,8 @@ class _LightRealizer:
         self._light = light
         self._view = view
         self._timing = timing
+        # Buses prolong greens themselves, and what they take has to be given back.
+        control = "fixed" if self._buses and control == "extended" else control
         self._control = control
         self._map = sumo_map
         self._net = sumo_map.net
@@ -186,6 +194,8 @@ class _LightRealizer:
         elif self._control == "actuated":
             loops = self._place_loops({p.stage: p for p in phases if p.prolonged})
             phases = self._add_endings(phases, loops, conditions)
+        elif self._control == "extended":
+            phases = extended_phases(phases)
         plan = PhasePlan(tuple(phases), len(phases)) if called is None else called.plan
         if self._buses and self._control == "fixed":
             plan = bus_phases(plan, {p.stage: _green_links(p.state) for p in phases}, self._buses,
@@ -198,7 +208,11 @@ class _LightRealizer:
         if not self._buses and self._control == "fixed" and not changed and offset == light.offset:
             return RealizedLight(shown)
         kind = "actuated" if self._buses else TYPES[self._control]
-        params = self._loop_params(loops) | ({} if called is None else {STAGES_PARAM: MAP_STAGES})
+        params = self._loop_params(loops)
+        if called is not None or self._control == "extended":
+            params |= {STAGES_PARAM: MAP_STAGES}
+        if self._control == "extended":
+            params |= {"max-gap": f"{EXTENDING_GAP:g}", CONTROL_PARAM: "extended"}
         start = started_offset(plan, offset)
         program = SumoProgram(ONLY_PLAN, kind, start, plan, conditions, params)
         return RealizedLight(shown, (program,), loops, buses=self._buses, areas=areas)
@@ -234,7 +248,7 @@ class _LightRealizer:
         plans = program.plans()
         active = active_plans(plans, clock=clock, until=until)
         calling = calling_movements(program)
-        walks = {n for n, one in enumerate(self._view.movements) if one.walk}
+        walks = {n for n, movement in enumerate(self._view.movements) if movement.walk}
         loops = waiting_places(
             self._light, self._net, {name: own & walks for name, own in calling.items()}
         )
@@ -274,8 +288,10 @@ class _LightRealizer:
         groups = tuple(
             self._picture.group(group.id, group.movements) for group in program.groups.values()
         )
-        told = self._picture.program(groups, tuple(shown_plans), loops, self._buses, own=True)
-        return RealizedLight(told, tuple(made), loops, active, self._buses, areas)
+        shown_light = self._picture.program(
+            groups, tuple(shown_plans), loops, self._buses, own=True
+        )
+        return RealizedLight(shown_light, tuple(made), loops, active, self._buses, areas)
 
     def _make_program(
         self,
@@ -342,8 +358,8 @@ class _LightRealizer:
             return params
         lanes = dict.fromkeys(
             link.source
-            for link, one in zip(self._light.links, self._view.movements, strict=True)
-            if one.drive
+            for link, movement in zip(self._light.links, self._view.movements, strict=True)
+            if movement.drive
         )
         params |= dict.fromkeys(lanes, "NO_DETECTOR")
         extra = []

@@ -44,17 +44,17 @@ def switched_lights(scenario: Scenario, sumo_map: SumoMap) -> tuple[SwitchedLigh
     which movements meet keep their program.
     """
     timings = {timing.junction: timing for timing in scenario.signals.junctions}
-    found = []
+    lights = []
     for light, view in zip(sumo_map.lights, scenario_lights(sumo_map), strict=True):
         own = [timings[name] for name in view.names if name in timings]
         timing = own[0] if own else JunctionTiming(junction=view.names[0])
         made = _designed_light(timing, view) if timing.stages else _map_light(light, timing, view)
         if made is not None:
             names, states, least, ways = made
-            found.append(
+            lights.append(
                 SwitchedLight(_light_facts(light, names, states, least, ways, sumo_map.net), ways)
             )
-    return tuple(found)
+    return tuple(lights)
 
 
 def lights_json(lights: tuple[SwitchedLight, ...]) -> str:
@@ -91,11 +91,11 @@ def _map_light(light: SumoLight, timing: JunctionTiming, view: Light) -> _Made |
     ways = tuple(
         tuple(
             ()
-            if one is other
-            else tuple((phase.seconds, phase.state) for phase in variants.way(one, other))
+            if stage is other
+            else tuple((phase.seconds, phase.state) for phase in variants.way(stage, other))
             for other in stages
         )
-        for one in stages
+        for stage in stages
     )
     greens = [phases[at] for at in variants.stages]
     return (
@@ -115,11 +115,11 @@ def _designed_light(timing: JunctionTiming, view: Light) -> _Made | None:
     ways = tuple(
         tuple(
             ()
-            if one is other
-            else tuple((step[0], step[1]) for step in change_steps(program, one, other))
+            if stage is other
+            else tuple((step[0], step[1]) for step in change_steps(program, stage, other))
             for other in stages
         )
-        for one in stages
+        for stage in stages
     )
     return (
         tuple(stage.id for stage in stages),

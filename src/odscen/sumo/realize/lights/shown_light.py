@@ -60,7 +60,7 @@ class ShownLight:
         """One cycle of a plan, and at which seconds of the run it takes over."""
         phases = []
         for p in plan.cycle:
-            free = self._control == "actuated" and p.prolonged and p.earliest_end is None
+            free = self._control != "fixed" and p.prolonged and p.earliest_end is None
             least, most = (p.least, p.most) if free else (0.0, 0.0)
             phases.append(ProgramPhase(p.seconds, p.state, p.name, p.stage, least, most, p.on_call))
         return ShownPlan(name, offset, tuple(phases), begins)
@@ -79,11 +79,11 @@ class ShownLight:
         if not self._light.links:
             return ()
         columns: dict[tuple[str, ...], list[int]] = {}
-        for n, one in enumerate(self._view.movements):
-            if not one.turn:
+        for n, movement in enumerate(self._view.movements):
+            if not movement.turn:
                 continue
             shown = tuple(phase.state[n].lower() for phase in self._light.phases)
-            columns.setdefault((one.approach, str(one.walk), *shown), []).append(n)
+            columns.setdefault((movement.approach, str(movement.walk), *shown), []).append(n)
         names = {True: count(1), False: count(1)}
         groups = []
         for links in columns.values():

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from odscen.scenario.signals.program_design import DesignedProgram, PlannedStage, TimedPlan
     from odscen.sumo.realize.lights.light_detectors import BusArea
 
+LONGEST_CYCLE = 120.0
+"""Seconds of a cycle all of whose greens are extended to their end, as the longest in practice."""
+
 HOLD = "hold "
 """How the names of phases begin that hold a stage for one that was not called."""
 
@@ -101,6 +104,21 @@ def kept_phases(light: SumoLight, green: Sequence[float]) -> list[SumoPhase]:
     return phases
 
 
+def extended_phases(phases: Sequence[SumoPhase]) -> list[SumoPhase]:
+    """Phases of which each green for vehicles may last longer, by as much as each other.
+
+    All together up to :data:`LONGEST_CYCLE`: greens in proportion would give most to those that
+    have most, though nothing is known of the demand.
+    """
+    greens = [phase for phase in phases if phase.prolonged]
+    free = max(0.0, LONGEST_CYCLE - sum(phase.seconds for phase in phases))
+    more = round(free / len(greens), 1) if greens else 0.0
+    return [
+        replace(phase, least=phase.seconds, most=phase.seconds + more) if phase.prolonged else phase
+        for phase in phases
+    ]
+
+
 def _vehicles_have_green(state: str, light: SumoLight) -> bool:
     """Whether a vehicle has green."""
     return any(
@@ -136,13 +154,15 @@ def calling_movements(program: DesignedProgram) -> dict[str, set[int]]:
     stages = program.timing.stages
     walks = {name for name, group in program.groups.items() if group.walk}
     served = {name for stage in stages if not stage.on_call for name in stage.groups}
-    found = {}
+    movements_by_stage = {}
     for stage in stages:
         if stage.on_call:
             own = set(stage.groups)
             calling = own - served or own & walks or own
-            found[stage.id] = {n for name in calling for n in program.groups[name].movements}
-    return found
+            movements_by_stage[stage.id] = {
+                n for name in calling for n in program.groups[name].movements
+            }
+    return movements_by_stage
 
 
 def plan_phases(
@@ -205,7 +225,7 @@ class _Phases:
             self._phases[main - 1] = replace(self._phases[main - 1], following=(0,))
         if self._cycle is not None:
             self._coordinate_stages(self._cycle)
-            return _from_its_end(self._phases, main, self._last[0])
+            return _rotate_to_stage_end(self._phases, main, self._last[0])
         return PhasePlan(tuple(self._phases), main)
 
     def _stage_after(self, number: int) -> int:
@@ -312,7 +332,7 @@ class _Phases:
                 self._phases[index] = replace(phase, latest_end=now)
 
 
-def _from_its_end(phases: list[SumoPhase], main: int, last: int) -> PhasePlan:
+def _rotate_to_stage_end(phases: list[SumoPhase], main: int, last: int) -> PhasePlan:
     """Phases in the order in which SUMO counts the cycle: the first stage comes last."""
     order = [*range(last + 1, main), *range(last + 1), *range(main, len(phases))]
     place = {old: new for new, old in enumerate(order)}
@@ -377,10 +397,10 @@ def _bus_green(main: Sequence[SumoPhase], at: int, first: int, came: str) -> lis
         main[at], seconds=BUS_GREEN, name=f"{HOLD}{main[at].stage}", least=1.0, most=BUS_GREEN,
         following=(first + 1,), early="0", final=came,
     )  # fmt: skip
-    found = [longer]
+    phases = [longer]
     for number, phase in enumerate(change, start=first + 1):
         last = number == first + len(change)
         early, final = (f"({came} < 1)", "1") if number == first + 1 else ("", "")
         following = (behind if last else number + 1,)
-        found.append(replace(phase, following=following, early=early, final=final))
-    return found
+        phases.append(replace(phase, following=following, early=early, final=final))
+    return phases

@@ -146,8 +146,8 @@ def demand_users(
     for background in scenario.demand.background:
         add(background_trips(scenario, ground, background, usable))
     if parking is not None:
-        users, said = parking.applied(users)
-        unmet += said
+        users, unparked = parking.applied(users)
+        unmet += unparked
     generated = [count for count in scenario.demand.counts if count.use == "generate"]
     if generated:
         others = [*placed, *users]

@@ -142,17 +142,17 @@ def _keep_plannable(
 ) -> tuple[Scenario, tuple[str, ...]]:
     """Scenario without the actors and flows that cannot be planned, and their ids."""
     wrong = {
-        (found[1], int(found[2]))
+        (match[1], int(match[2]))
         for problem in every_problem(scenario, sumo_map.graph, region=region)
-        if problem.severity == "error" and (found := _PLACED.match(problem.where))
+        if problem.severity == "error" and (match := _PLACED.match(problem.where))
     }
     kept: dict[str, tuple[object, ...]] = {}
     gone: list[str] = []
     for kind in ("actors", "flows"):
         ones = list(enumerate(getattr(scenario, kind)))
         bad = {n for n, one in ones if (kind, n) in wrong}
-        kept[kind] = tuple(one for n, one in ones if n not in bad)
-        gone += [one.id for n, one in ones if n in bad]
+        kept[kind] = tuple(user for n, user in ones if n not in bad)
+        gone += [user.id for n, user in ones if n in bad]
     return scenario.model_copy(update=kept), tuple(gone)
 
 
@@ -161,7 +161,7 @@ def _plan_paths(
 ) -> list[Int32Array]:
     """Nodes of the route of each; empty where there is none."""
     drivable = region.router_over(sumo_map.drivable)
-    found: list[Int32Array] = [np.empty(0, dtype=np.int32)] * len(users)
+    paths: list[Int32Array] = [np.empty(0, dtype=np.int32)] * len(users)
     asked = list(range(len(users)))
     if len(users) >= GROUPED_FROM:
         goals = Counter((user.person, user.goal) for user in users if not user.via)
@@ -176,12 +176,12 @@ def _plan_paths(
         ]
         trips = [replace(users[n], trip=True) for n in together]
         for n, path in each_path(trips, region, drivable, [bodies[k] for k in together]):
-            found[together[n]] = path
-        asked = [n for n in asked if not len(found[n])]
+            paths[together[n]] = path
+        asked = [n for n in asked if not len(paths[n])]
     alone = [users[n] for n in asked]
     for n, path in each_path(alone, region, drivable, [bodies[k] for k in asked]):
-        found[asked[n]] = path
-    return found
+        paths[asked[n]] = path
+    return paths
 
 
 def _is_searched(user: RoadUser, drivable: Router) -> bool:

@@ -16,7 +16,7 @@ from odscen.sumo.realize.lights.light_views import scenario_lights
 from odscen.sumo.realize.routes_file import HeldActor
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from odscen.scenario.document.scenario_document import Scenario
     from odscen.sumo.realize.sumo_map import SumoMap
@@ -52,7 +52,8 @@ class StoryPlan:
         Speeds, m/s, at which the story alone begins to drive vehicles, by their ids; ``None`` is
         that at which one appears.
     without_goal
-        Vehicles that rules move and that have no goal of their own: where they end up decides.
+        Vehicles that rules move and that have no goal of their own: where they end up decides. And
+        pedestrians of recordings, who follow their track and vanish.
     """
 
     rules: tuple[StoryRule, ...]
@@ -72,7 +73,7 @@ class StoryPlan:
         places = {name: list(place) for name, place in self.places.items()}
         head = {"format": FORMAT, "version": VERSION, "places": places, "signals": signals}
         if self.held:
-            head["held"] = {name: asdict(one) for name, one in self.held.items()}
+            head["held"] = {name: asdict(insertion) for name, insertion in self.held.items()}
         if self.by_story:
             head["by_story"] = dict(self.by_story)
         if self.without_goal:
@@ -96,12 +97,23 @@ class StoryPlan:
                 {name: StoryPlace(*place) for name, place in data["places"].items()},
                 {(light, name): (tl, link) for light, name, tl, link in data["signals"]},
                 {
-                    name: HeldActor(tuple(one["edges"]), one["attributes"], one["person"])
-                    for name, one in data.get("held", {}).items()
+                    name: HeldActor(
+                        tuple(insertion["edges"]), insertion["attributes"], insertion["person"]
+                    )
+                    for name, insertion in data.get("held", {}).items()
                 },
                 data.get("by_story", {}),
                 tuple(data.get("without_goal", ())),
             )
+
+
+def _follows_only_track(rules: Sequence[StoryRule]) -> bool:
+    actions = [action for rule in rules for action in rule.then]
+    follows, vanishes, leaves = (
+        any(getattr(action, kind, None) is not None for action in actions)
+        for kind in ("replay", "vanish", "release")
+    )
+    return follows and vanishes and not leaves
 
 
 def story_plan(
@@ -119,11 +131,15 @@ def story_plan(
         actor.id: None if actor.id in held else actor.initial_speed or 0.0
         for actor in scenario.by_story
     }
-    moved = {rule.actor for rule in scenario.rules}
+    moved: dict[str, list[StoryRule]] = {}
+    for rule in scenario.rules:
+        moved.setdefault(rule.actor, []).append(rule)
     free = tuple(
         actor.id
         for actor in scenario.actors
-        if actor.id in moved and actor.goal is None and actor.category is not Category.PEDESTRIAN
+        if actor.id in moved
+        and actor.goal is None
+        and (actor.category is not Category.PEDESTRIAN or _follows_only_track(moved[actor.id]))
     )
     plan = StoryPlan(scenario.rules, held=held, by_story=speeds, without_goal=free)
     for index, rule in enumerate(scenario.rules):

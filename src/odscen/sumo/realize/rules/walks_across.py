@@ -46,24 +46,24 @@ class WalkAcross(NamedTuple):
 
     def rules(self, graph: MapGraph, actor: str, taken: set[str]) -> list[StoryRule]:
         """Rules by which an actor walks so; ``taken`` are ids of others, and of these then."""
-        found: list[StoryRule] = []
+        rules: list[StoryRule] = []
         for start, end in self.crossings:
-            name = f"{actor[:48]}.crosses{len(found) + 1 if found else ''}"
+            name = f"{actor[:48]}.crosses{len(rules) + 1 if rules else ''}"
             while name in taken:
                 name += "_"
             taken.add(name)
             width, place = float(graph.walks.width[start]), walk_node_id(graph, start)
             when = (
                 _condition_at_place(place, width)
-                if found or start != self.path[0]
+                if rules or start != self.path[0]
                 else {"appeared": {}}
             )
-            if found:
-                when = {"all": [{"rule": {"id": found[-1].id}}, when]}
+            if rules:
+                when = {"all": [{"rule": {"id": rules[-1].id}}, when]}
             then = [{"walk": {"to": walk_node_id(graph, end)}}]
             data = {"id": name, "actor": actor, "when": when, "then": then}
-            found.append(StoryRule.model_validate(data))
-        return found
+            rules.append(StoryRule.model_validate(data))
+        return rules
 
 
 def _condition_at_place(place: str, width: float) -> dict[str, Any]:

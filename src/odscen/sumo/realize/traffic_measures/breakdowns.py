@@ -90,8 +90,10 @@ def breakdowns(scenario: Scenario, sumo_map: SumoMap, *, until: float) -> tuple[
     ]
     if not incidents:
         return ()
-    found = MeasuredLanes(sumo_map)
-    return tuple(_plan_breakdown(incident, found, sumo_map, until) for incident in incidents)
+    measured_lanes = MeasuredLanes(sumo_map)
+    return tuple(
+        _plan_breakdown(incident, measured_lanes, sumo_map, until) for incident in incidents
+    )
 
 
 def _plan_breakdown(

@@ -154,32 +154,33 @@ def measure_actions(
     active = [measure for measure in scenario.measures if measure.begin < until]
     if not active:
         return MeasureActions()
-    found = MeasuredLanes(sumo_map)
+    measured_lanes = MeasuredLanes(sumo_map)
     closings = [
         ClosedLanes(
             measure.id,
             measure.begin,
             end_of(measure, until),
-            found.closed_by(closed_places(measure)),
+            measured_lanes.closed_by(closed_places(measure)),
             frozenset(KINDS[category].vclass for category in banned_by(measure)),
-            *_resolve_destinations(measure, found),
+            *_resolve_destinations(measure, measured_lanes),
         )
         for measure in active
         if isinstance(measure, RoadClosure | Roadworks | ChangedPermission)
         and closed_places(measure)
     ]
     lines = [
-        *_rerouter_lines(closings, found, step_length),
-        *_speed_sign_lines(active, found, until),
+        *_rerouter_lines(closings, measured_lanes, step_length),
+        *_speed_sign_lines(active, measured_lanes, until),
     ]
     xml = "\n".join(["<additional>", *lines, "</additional>", ""]) if lines else None
     planned = sorted(
-        (_plan_measure(measure, found, sumo_map, until) for measure in active), key=_begin_and_id
+        (_plan_measure(measure, measured_lanes, sumo_map, until) for measure in active),
+        key=_begin_and_id,
     )
     return MeasureActions(
         xml,
         tuple(planned),
-        tuple(_closed_periods(closings, found, until)),
+        tuple(_closed_periods(closings, measured_lanes, until)),
         tuple(closings),
     )
 

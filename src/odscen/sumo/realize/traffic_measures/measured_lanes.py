@@ -40,10 +40,10 @@ class MeasuredLanes:
         ScenarioError
             If the map has no such place.
         """
-        found = self.places.find(name)
-        if isinstance(found, UnknownPlace):
-            raise ScenarioError(found.message, element=name)
-        return found
+        place = self.places.find(name)
+        if isinstance(place, UnknownPlace):
+            raise ScenarioError(place.message, element=name)
+        return place
 
     def lanes(self, name: str) -> tuple[str, ...]:
         """SUMO lanes of a segment or lane, or those inside the junction of a turn; sorted."""
@@ -193,7 +193,7 @@ def by_lane(
     values: Iterable[tuple[str, float, float, float]],
 ) -> dict[str, list[tuple[float, float, float]]]:
     """Group rows of lane, begin, end and value by lane."""
-    found: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
+    parts_by_lane: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
     for lane, begin, end, value in values:
-        found[lane].append((begin, end, value))
-    return dict(found)
+        parts_by_lane[lane].append((begin, end, value))
+    return dict(parts_by_lane)

@@ -58,15 +58,15 @@ def _stop_visits(
     scenario: Scenario, line: TransitLine, number: int, depart: float, nodes: Mapping[str, int]
 ) -> tuple[StopVisit, ...]:
     visits = []
-    for row, one in enumerate(line.stops):
+    for row, stop in enumerate(line.stops):
         rng = stream(scenario.seed, "dwell", line.id, str(number), str(row))
-        dwell = (one.dwell or line.dwell).draw(rng)
+        dwell = (stop.dwell or line.dwell).draw(rng)
         visits.append(
             StopVisit(
-                stop=one.stop,
-                node=nodes[one.stop],
+                stop=stop.stop,
+                node=nodes[stop.stop],
                 dwell=round(max(dwell, LEAST_DWELL), 1),
-                scheduled=None if one.after is None else round(depart + one.after, 2),
+                scheduled=None if stop.after is None else round(depart + stop.after, 2),
             )
         )
     return tuple(visits)

@@ -27,7 +27,7 @@ ALTERNATIVES = 12
 _ROUND_END = 3.0
 """Metres of lane before the first and behind the last place of an area."""
 
-_SEEN = 2
+_END_EDGES = 2
 """Edges at an end of a route among which that of an area is looked for."""
 
 
@@ -50,7 +50,7 @@ def parking_positions(sumo_map: SumoMap, inside: BoolArray) -> dict[str, Parking
     inside
         Shape ``(N,)``: nodes of the lane graph that are in the region.
     """
-    found: dict[str, ParkingPosition] = {}
+    positions: dict[str, ParkingPosition] = {}
     places = sumo_map.lane_places
     for area in sumo_map.parking.areas:
         if not inside[area.node]:
@@ -59,13 +59,15 @@ def parking_positions(sumo_map: SumoMap, inside: BoolArray) -> dict[str, Parking
         lane = None if middle is None else sumo_map.net.lanes[middle[0]]
         if lane is None or lane.internal or not lane.allows("passenger"):
             continue
-        at = [place[1] for node in area.nodes if (place := places.of(node)) and place[0] == lane.id]
-        begin = round(max(min(at) - _ROUND_END, 0.0), 2)
+        along = [
+            place[1] for node in area.nodes if (place := places.of(node)) and place[0] == lane.id
+        ]
+        begin = round(max(min(along) - _ROUND_END, 0.0), 2)
         # As SUMO reads it: a trip that ends a hair behind its area would drive on after its stay.
-        end = round(min(max(at) + _ROUND_END, lane.length - CLEAR), 2)
+        end = round(min(max(along) + _ROUND_END, lane.length - CLEAR), 2)
         if end - begin >= LEAST_LENGTH:
-            found[area.id] = ParkingPosition(area, lane.id, lane.index, lane.edge, begin, end)
-    return found
+            positions[area.id] = ParkingPosition(area, lane.id, lane.index, lane.edge, begin, end)
+    return positions
 
 
 def planned_parking(
@@ -109,6 +111,7 @@ def parking_xml(
         own = begins.get(position.area.id, 0)
         lines += _area_lines(position, begin_area(position.area.id), spaces[:own])
         lines += _area_lines(position, position.area.id, spaces[own:])
+    # Nobody is sent to an area all of whose places belong to trips that begin there.
     positions = [
         position
         for position in positions
@@ -122,7 +125,7 @@ def parking_xml(
         ]
         lines += [
             f'            <parkingAreaReroute id="{position.area.id}" visible="true"/>'
-            for position in _known_from(here, positions, lanes)
+            for position in _list_areas_known_from(here, positions, lanes)
         ]
         lines += ["        </interval>", "    </rerouter>"]
     return "\n".join([*lines, "</additional>", ""])
@@ -153,7 +156,7 @@ def _space_element(place: ParkingPlace, z: float, sumo_map: SumoMap) -> str:
     )
 
 
-def _known_from(
+def _list_areas_known_from(
     here: Sequence[ParkingPosition], every: Sequence[ParkingPosition], lanes: LaneGraph
 ) -> list[ParkingPosition]:
     """Areas of an edge, then the nearest others."""
@@ -186,32 +189,33 @@ def parked_route(
     """
     edges = route.edges
     if begins is not None:
-        edges = _from_area(edges, begins, net, vclass)
+        edges = _begin_at_area(edges, begins, net, vclass)
         route = replace(
             route, depart_lane=begins.lane_index, depart_pos=begins.end, depart_pos_lat=0.0
         )
     if ends is not None:
-        edges = _to_area(edges, ends, net, vclass)
+        edges = _end_at_area(edges, ends, net, vclass)
         route = replace(route, arrival_lane=None, arrival_pos=ends.end)
     return replace(route, edges=edges)
 
 
-def _from_area(
+def _begin_at_area(
     edges: tuple[str, ...], area: ParkingPosition, net: RoadNet, vclass: str
 ) -> tuple[str, ...]:
-    for at in range(min(_SEEN, len(edges))):
+    for at in range(min(_END_EDGES, len(edges))):
         if edges[at] == area.edge:
             return edges[at:]
+    # A route that begins inside a junction begins on the area's edge, which leads into it.
     normal = edges[1:] if net.edge_lanes[edges[0]][0].internal else edges
     if normal and normal[0] in net.followers(area.edge, vclass):
         return (area.edge, *normal)
     raise NoRouteError(f"its route on the SUMO network does not begin at parking {area.area.id}")
 
 
-def _to_area(
+def _end_at_area(
     edges: tuple[str, ...], area: ParkingPosition, net: RoadNet, vclass: str
 ) -> tuple[str, ...]:
-    for cut in range(min(_SEEN, len(edges))):
+    for cut in range(min(_END_EDGES, len(edges))):
         if edges[len(edges) - 1 - cut] == area.edge:
             return edges[: len(edges) - cut]
     if area.edge in net.followers(edges[-1], vclass):

@@ -41,7 +41,7 @@ def stop_places(scenario: Scenario, sumo_map: SumoMap) -> dict[str, StopPlace]:
     ScenarioError
         With every stop for which the network has no lane, or too little of it.
     """
-    found: dict[str, StopPlace] = {}
+    places: dict[str, StopPlace] = {}
     problems: list[str] = []
     for index, stop in enumerate(scenario.transit.stops):
         node = place_of(sumo_map.graph, stop.node)
@@ -56,10 +56,10 @@ def stop_places(scenario: Scenario, sumo_map: SumoMap) -> dict[str, StopPlace]:
         if end - begin < LEAST_LENGTH:
             problems.append(f"{where}: only {end - begin:.1f} m of it are on its SUMO lane")
             continue
-        found[stop.id] = StopPlace(stop.id, stop.name, lane.id, lane.edge, begin, end, stop.bay)
+        places[stop.id] = StopPlace(stop.id, stop.name, lane.id, lane.edge, begin, end, stop.bay)
     if problems:
         raise ScenarioError("stops that cannot be there", problems=problems)
-    return found
+    return places
 
 
 def stops_xml(stops: Mapping[str, StopPlace]) -> str:

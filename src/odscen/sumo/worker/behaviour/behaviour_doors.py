@@ -189,9 +189,9 @@ class PipedDriver(_Peer):
                 code = self._process.wait(1.0)
         self._said.seek(max(0, self._said.seek(0, os.SEEK_END) - _LAST_BYTES))
         lines = self._said.read().decode("utf-8", "replace").strip().splitlines()[-_LAST_LINES:]
-        said = f": {' / '.join(lines)}" if lines else ""
+        output = f": {' / '.join(lines)}" if lines else ""
         how = "it has closed its output" if code is None else f"it ended with exit code {code}"
-        return f"{how}{said}"
+        return f"{how}{output}"
 
     def _stop_peer(self) -> None:
         if self._process is not None:

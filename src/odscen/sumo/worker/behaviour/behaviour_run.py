@@ -139,7 +139,7 @@ class BehaviourRun:
         rows = np.flatnonzero(mine & free)
         name = ""
         try:
-            for name in self._taken_over(index, names, rows, asked):
+            for name in self._take_over_vehicles(index, names, rows, asked):
                 self._earlier.discard(name)
             some, speeds = self._new_speeds(index, rows, asked)
             set_speed = self._road.set_speed
@@ -162,7 +162,7 @@ class BehaviourRun:
     def _forget_rows(self, rows: Any) -> None:
         self._mode[rows], self._speed[rows] = 0, np.nan
 
-    def _taken_over(
+    def _take_over_vehicles(
         self, index: Int32Array, names: list[str], rows: IntArray, asked: CheckedAction
     ) -> Iterator[str]:
         """Let vehicles do what is set, where they do not yet; yields each before that."""

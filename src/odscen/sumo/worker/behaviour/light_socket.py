@@ -33,8 +33,8 @@ class LightSocket:
     def switch(self, observation: LightsObservation, state: None) -> list[int]:
         """Ask it."""
         del state
-        found: list[int] = json.loads(self._driver.ask(observation_json(observation)))
-        return found
+        stages: list[int] = json.loads(self._driver.ask(observation_json(observation)))
+        return stages
 
     def close(self) -> None:
         """Hang up."""

@@ -57,8 +57,8 @@ class SeenLights:
             for light, size in zip(self._lights, self._sizes, strict=True)
         ]
         letters = np.frombuffer("".join(states).encode("ascii", "replace"), dtype=np.uint8)
-        found: Int32Array = np.where(links >= 0, _SHOWN[letters[links]], LightAhead.NONE)
-        return found
+        shown_lights: Int32Array = np.where(links >= 0, _SHOWN[letters[links]], LightAhead.NONE)
+        return shown_lights
 
 
 # ---------------------------------------------------------------------- what a behaviour model sees
@@ -179,8 +179,8 @@ class RoadSight:
                     self._route_index[row] = self._road.route_index(name)
                     self._look_ahead(name, row, str(self._lane_ids[row]))
             self._moved.clear()
-        found: Int32Array = self._ahead[self._index]
-        return found
+        lanes: Int32Array = self._ahead[self._index]
+        return lanes
 
     def _look_ahead(self, name: str, row: int, lane: str) -> None:
         """Find where a vehicle goes from a lane that it has just come to."""
@@ -200,26 +200,26 @@ class RoadSight:
         self, lane: str, edges: tuple[str, ...], kind: str
     ) -> tuple[list[int], bool, bool, str]:
         """Rows of the lanes ahead, whether either lane beside leads on, where the lane leads."""
-        found: list[int] = []
-        first, one, left = "", self._lanes[lane], list(edges)
-        while len(found) < AHEAD:
-            target, via = self._lane_onward(one, left)
+        rows_ahead: list[int] = []
+        first, at, left = "", self._lanes[lane], list(edges)
+        while len(rows_ahead) < AHEAD:
+            target, via = self._lane_onward(at, left)
             first = first or target
             if not target:
                 break
-            if one.id not in self._inside:
+            if at.id not in self._inside:
                 left = left[1:]
             for name in (via, "" if via else target):
                 if name in self._lane_row:
-                    found.append(self._lane_row[name])
-                    one = self._lanes[name]
+                    rows_ahead.append(self._lane_row[name])
+                    at = self._lanes[name]
         row, scene = self._lane_row[lane], self.scene
         inside = lane in self._inside
         beside = [
             not inside and self._leads_on(int(side[row]), edges, kind)
             for side in (scene.lane_left, scene.lane_right)
         ]
-        padded = (found + [-1] * AHEAD)[:AHEAD]
+        padded = (rows_ahead + [-1] * AHEAD)[:AHEAD]
         return padded, beside[0], beside[1], first
 
     def _lane_onward(self, lane: LaneFacts, edges: Sequence[str]) -> tuple[str, str]:

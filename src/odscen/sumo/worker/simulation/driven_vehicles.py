@@ -99,7 +99,7 @@ class DrivenVehicles:
     def lanes(self) -> list[LaneFacts]:
         """Lanes that vehicles may use, inside junctions as well."""
         lane = self._sumo.lane
-        found = []
+        facts = []
         for edge, names in sorted(self._lanes.of_edge.items()):
             for name in sorted(names, key=lambda name: (len(name), name)):
                 allowed = frozenset(lane.getAllowed(name))
@@ -107,13 +107,13 @@ class DrivenVehicles:
                     continue
                 links = tuple((link[0], link[4]) for link in lane.getLinks(name))
                 shape = tuple(lane.getShape(name))
-                found.append(
+                facts.append(
                     LaneFacts(
                         name, edge, lane.getLength(name), lane.getMaxSpeed(name),
                         lane.getWidth(name), shape, links, allowed,
                     )
                 )  # fmt: skip
-        return found
+        return facts
 
     def light_links(self) -> dict[tuple[str, str], tuple[str, int]]:
         """Light and number of the link from one lane to another, where there is one."""
@@ -131,8 +131,8 @@ class DrivenVehicles:
 
     def coming_edges(self, name: str) -> tuple[str, ...]:
         """Edges of a vehicle's route after the one that it is on."""
-        one = self._sumo.vehicle
-        return tuple(one.getRoute(name)[one.getRouteIndex(name) + 1 :])
+        vehicles = self._sumo.vehicle
+        return tuple(vehicles.getRoute(name)[vehicles.getRouteIndex(name) + 1 :])
 
     def route_index(self, name: str) -> int:
         """Place in its route of the edge that a vehicle is on."""

@@ -22,12 +22,12 @@ class LaneLines:
 
     def beside(self, vehicle: str, by: int) -> tuple[Shape, ...]:
         """Centre lines of the lanes ``by`` lanes beside that of a vehicle, on either side of it."""
-        one = self._sumo.vehicle
-        own = one.getLaneID(vehicle)
+        vehicles = self._sumo.vehicle
+        own = vehicles.getLaneID(vehicle)
         if not own:
             return ()
         lanes = self._lanes.in_order(self._sumo.lane.getEdgeID(own))
-        kind, row = one.getVehicleClass(vehicle), lanes.index(own)
+        kind, row = vehicles.getVehicleClass(vehicle), lanes.index(own)
         rows = {row + by, row - by}
         return tuple(
             self._line_ahead(vehicle, lanes[n], kind)
@@ -37,11 +37,11 @@ class LaneLines:
 
     def own(self, vehicle: str) -> tuple[Shape, ...]:
         """Centre lines of all lanes of its edge that a vehicle may use, and of where they lead."""
-        one = self._sumo.vehicle
-        own = one.getLaneID(vehicle)
+        vehicles = self._sumo.vehicle
+        own = vehicles.getLaneID(vehicle)
         if not own:
             return ()
-        kind = one.getVehicleClass(vehicle)
+        kind = vehicles.getVehicleClass(vehicle)
         lanes = self._lanes.in_order(self._sumo.lane.getEdgeID(own))
         return tuple(
             self._line_ahead(vehicle, lane, kind)
@@ -51,8 +51,8 @@ class LaneLines:
 
     def _line_ahead(self, vehicle: str, lane: str, kind: str) -> Shape:
         """Centre line of a lane and of those that it leads to, along the route if it does."""
-        lanes, one = self._sumo.lane, self._sumo.vehicle
-        route = set(one.getRoute(vehicle)[max(one.getRouteIndex(vehicle), 0) :])
+        lanes, vehicles = self._sumo.lane, self._sumo.vehicle
+        route = set(vehicles.getRoute(vehicle)[max(vehicles.getRouteIndex(vehicle), 0) :])
         line, metres = list(lanes.getShape(lane)), lanes.getLength(lane)
         while metres < _AHEAD:
             links = [link for link in lanes.getLinks(lane) if self._lanes.admits(link[0], kind)]

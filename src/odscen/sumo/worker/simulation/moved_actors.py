@@ -22,6 +22,7 @@ _NEAR = 12.0
 """Metres around a place in which SUMO looks for its lane."""
 _FREE, _ON_FOOT = 2, 6
 """``keepRoute``: exactly there, off the route and the road as well; of persons seen by drivers."""
+_WALKER_WIDTH = 1.0
 _NOWHERE = 1e8
 _INSIDE = 0.1
 """Metres that a body has to be over a lane to be on it."""
@@ -126,12 +127,14 @@ class MovedActors:
 
     def person(self, name: str) -> SeenPerson | None:
         """A person, ``None`` if it is not on the road."""
-        one = self._sumo.person
+        persons = self._sumo.person
         try:
-            x, y = one.getPosition(name)
+            x, y = persons.getPosition(name)
             if abs(x) > _NOWHERE:
                 return None
-            return SeenPerson(x, y, one.getAngle(name), one.getSpeed(name), one.getLaneID(name))
+            return SeenPerson(
+                x, y, persons.getAngle(name), persons.getSpeed(name), persons.getLaneID(name)
+            )
         except self._errors:
             return None
 
@@ -157,11 +160,11 @@ class MovedActors:
         ignore_right_of_way: bool = False,
     ) -> None:
         """Set the speed of the next step, and what is not heeded; ``None`` is SUMO's own speed."""
-        one = self._sumo.vehicle
+        vehicles = self._sumo.vehicle
         mode = _ALL_CHECKS if speed is None else _NO_CHECKS if exact else _SAFE
         mode &= ~(_RED * ignore_red | _RIGHT_OF_WAY * ignore_right_of_way)
-        one.setSpeedMode(vehicle, mode)
-        one.setSpeed(vehicle, -1.0 if speed is None else speed)
+        vehicles.setSpeedMode(vehicle, mode)
+        vehicles.setSpeed(vehicle, -1.0 if speed is None else speed)
 
     def fastest(self, vehicle: str) -> float:
         """Highest speed that a vehicle's type allows, m/s."""
@@ -183,9 +186,18 @@ class MovedActors:
         """Place the front of a vehicle for the next step."""
         self._sumo.vehicle.moveToXY(vehicle, "", -1, x, y, angle_deg, _FREE, _NEAR)
 
-    def put_person(self, person: str, x: float, y: float, angle_deg: float) -> None:
-        """Place a person for the next step, on a road as well; drivers brake for it."""
-        self._sumo.person.moveToXY(person, "", x, y, angle_deg, _ON_FOOT, 100.0)
+    def put_person(
+        self, person: str, x: float, y: float, angle_deg: float, *, only_on_lanes: bool = False
+    ) -> None:
+        """Place a person for the next step, on a road as well; drivers brake for it.
+
+        With ``only_on_lanes`` SUMO looks for a lane on those of cars only. It ends in a fault where
+        it takes a walking area that is not on the way of the person, but a person that it has not
+        followed does not find back to its walk.
+        """
+        beside = only_on_lanes and self.off_lanes(x, y, width=_WALKER_WIDTH)
+        near = 0.0 if beside else 100.0
+        self._sumo.person.moveToXY(person, "", x, y, angle_deg, _ON_FOOT, near)
 
     def walk_speed(self, person: str, speed: float) -> None:
         """Set the speed at which a person walks, m/s."""
@@ -233,8 +245,8 @@ class MovedActors:
 
         Beyond, so that it does not end its trip before it is where it is to arrive.
         """
-        one, links = self._sumo.vehicle, self._sumo.lane.getLinks
-        kind = one.getVehicleClass(vehicle)
+        vehicles, links = self._sumo.vehicle, self._sumo.lane.getLinks
+        kind = vehicles.getVehicleClass(vehicle)
         beyond = next(
             (
                 self._sumo.lane.getEdgeID(link[0])
@@ -245,11 +257,11 @@ class MovedActors:
             None,
         )
         try:
-            one.setVia(vehicle, [edge] if beyond is not None else [])
-            one.changeTarget(vehicle, beyond or edge)
+            vehicles.setVia(vehicle, [edge] if beyond is not None else [])
+            vehicles.changeTarget(vehicle, beyond or edge)
         except self._errors:
             return False
-        return edge in one.getRoute(vehicle)
+        return edge in vehicles.getRoute(vehicle)
 
     def follow_lane(self, vehicle: str, *, within: float) -> None:
         """Lead a vehicle on along its lane, straight on at forks, if its route leaves that.
@@ -257,16 +269,16 @@ class MovedActors:
         Only so many metres before the end of the lane, where SUMO would stop it dead; until then
         it may still change lanes. Its trip ends where that lane ends.
         """
-        one, lanes = self._sumo.vehicle, self._sumo.lane
-        lane, route = one.getLaneID(vehicle), one.getRoute(vehicle)
-        row = one.getRouteIndex(vehicle)
+        vehicles, lanes = self._sumo.vehicle, self._sumo.lane
+        lane, route = vehicles.getLaneID(vehicle), vehicles.getRoute(vehicle)
+        row = vehicles.getRouteIndex(vehicle)
         if not lane or lane in self._lanes.internal or not 0 <= row < len(route) - 1:
             return
-        if lanes.getLength(lane) - one.getLanePosition(vehicle) > within + _NEAR_END:
+        if lanes.getLength(lane) - vehicles.getLanePosition(vehicle) > within + _NEAR_END:
             return
-        kind = one.getVehicleClass(vehicle)
+        kind = vehicles.getVehicleClass(vehicle)
         onward = self._lanes.onwards(lane, kind)
-        leads_on = any(best[0] == lane and best[4] for best in one.getBestLanes(vehicle))
+        leads_on = any(best[0] == lane and best[4] for best in vehicles.getBestLanes(vehicle))
         if not onward or leads_on:
             return
         edges = [lanes.getEdgeID(lane)]
@@ -279,7 +291,7 @@ class MovedActors:
             edges.append(edge)
             metres += lanes.getLength(lane)
             onward = self._lanes.onwards(lane, kind)
-        one.setRoute(vehicle, edges)
+        vehicles.setRoute(vehicle, edges)
 
     def arrive(self, vehicle: str) -> None:
         """End the trip of a vehicle where it is."""
@@ -377,10 +389,10 @@ class MovedActors:
     def driving_distance(self, vehicle: str, edge: str, pos: float, lane: int = 0) -> float | None:
         """Metres from a vehicle's front along its route; ``None`` if it does not lead there."""
         try:
-            found = float(self._sumo.vehicle.getDrivingDistance(vehicle, edge, pos, lane))
+            distance = float(self._sumo.vehicle.getDrivingDistance(vehicle, edge, pos, lane))
         except self._errors:
             return None
-        return found if abs(found) < _NOWHERE else None
+        return distance if abs(distance) < _NOWHERE else None
 
     def is_in_junction(self, edge: str) -> bool:
         """Whether an edge leads over a junction."""
@@ -388,8 +400,12 @@ class MovedActors:
 
     def road_place(self, vehicle: str) -> tuple[str, float, int]:
         """Edge of a vehicle, metres along it, and its lane."""
-        one = self._sumo.vehicle
-        return one.getRoadID(vehicle), one.getLanePosition(vehicle), one.getLaneIndex(vehicle)
+        vehicles = self._sumo.vehicle
+        return (
+            vehicles.getRoadID(vehicle),
+            vehicles.getLanePosition(vehicle),
+            vehicles.getLaneIndex(vehicle),
+        )
 
     def nearest_road(self, x: float, y: float) -> tuple[str, float, int]:
         """Edge for cars that is nearest, metres along it, and lane."""
@@ -423,5 +439,5 @@ class MovedActors:
 
     def collisions(self) -> set[frozenset[str]]:
         """Pairs that SUMO itself has seen collide in the last step."""
-        found = self._sumo.simulation.getCollisions()
-        return {frozenset((collision.collider, collision.victim)) for collision in found}
+        collisions = self._sumo.simulation.getCollisions()
+        return {frozenset((collision.collider, collision.victim)) for collision in collisions}

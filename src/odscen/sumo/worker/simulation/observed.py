@@ -83,7 +83,9 @@ class StepLists(NamedTuple):
     def from_row(cls, row: Sequence[Any]) -> Self:
         """One from its JSON."""
         step = cls(*row)
-        fronts = {name: None if one is None else Front(*one) for name, one in step.fronts.items()}
+        fronts = {
+            name: None if front is None else Front(*front) for name, front in step.fronts.items()
+        }
         touching = [Collision(*collision) for collision in step.collisions]
         return step._replace(collisions=touching, fronts=fronts)
 

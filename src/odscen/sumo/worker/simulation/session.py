@@ -178,7 +178,7 @@ class Session:
         # A list costs far more than its length, and most are empty.
         lists: list[Any] = [ids() if count() else () for count, ids in self._happenings]
         if self._foreign is not None:
-            lists = [_of_the_run(ids) for ids in lists]
+            lists = [_drop_foreign_users(ids) for ids in lists]
         if not any(lists):
             return None
         fronts: dict[str, Front | None] = {}
@@ -465,6 +465,6 @@ def _native_function(sumo: Any, domain: str, name: str) -> Any:
     return getattr(getattr(sumo, "_libsumo", None), f"{domain}_{name}", getter)
 
 
-def _of_the_run(happened: Sequence[Any]) -> list[Any]:
+def _drop_foreign_users(happened: Sequence[Any]) -> list[Any]:
     """Leave out what happened to road users that other programs drive, but collisions."""
     return [name for name in happened if not (isinstance(name, str) and is_foreign(name))]

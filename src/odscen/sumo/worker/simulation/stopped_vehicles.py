@@ -40,12 +40,12 @@ class StoppedVehicles:
     def longer_than(self, seconds: float) -> list[StoppedVehicle]:
         """Vehicles that have been stopped for so long; a microsecond for each on the road."""
         vehicle = self._sumo.vehicle
-        found = []
+        vehicles = []
         for name in vehicle.getIDList():
             waited = 0.0 if is_foreign(name) else vehicle.getWaitingTime(name)
             if waited >= seconds and (lane := vehicle.getLaneID(name)):
-                found.append(StoppedVehicle(name, lane, vehicle.getLanePosition(name), waited))
-        return found
+                vehicles.append(StoppedVehicle(name, lane, vehicle.getLanePosition(name), waited))
+        return vehicles
 
     def ahead(self, name: str) -> ViewAhead | None:
         """What a vehicle has before it; ``None`` if it is not on the road."""

@@ -269,10 +269,12 @@ class TurningGaps:
                     self._plan_look(name, 1)
             elif self._body_of(name).length > _LONGEST:
                 if lane == turn.waiting and self._may_go(turn, lane, lights):
-                    self._passed_by(name, turn)  # it takes SUMO's gaps, and waits for bodies
+                    self._find_ignored_waiting(
+                        name, turn
+                    )  # it takes SUMO's gaps, and waits for bodies
             elif lane in turn.inside and lane != turn.waiting:
                 if any(self._list_on(crossed) for crossed, _ in turn.crossed):
-                    self._set_ignored(name, self._passed_on_way(name, turn))
+                    self._set_ignored(name, self._find_ignored_turning(name, turn))
             elif not self._may_go(turn, lane, lights):
                 self._set_ignored(name, ())
                 self._waiting[name] = turn, self._step
@@ -282,7 +284,7 @@ class TurningGaps:
                 self._forget_vehicle(name)
                 self._plan_look(name, 1)
             else:
-                self._set_ignored(name, self._passed_by(name, turn))
+                self._set_ignored(name, self._find_ignored_waiting(name, turn))
 
     def after_step(self) -> None:
         """Let those go who were held for a step."""
@@ -458,7 +460,7 @@ class TurningGaps:
 
     # ------------------------------------------------------------------------ gaps
 
-    def _passed_by(self, name: str, turn: _Turn) -> list[str]:
+    def _find_ignored_waiting(self, name: str, turn: _Turn) -> list[str]:
         """Those whom one who has not begun to turn need not wait for.
 
         Who has to wait for one starts for none: it would be late for the others. SUMO would let it
@@ -534,7 +536,7 @@ class TurningGaps:
         self._sumo.vehicle.setSpeed(name, speed)
         self._held.append(name)
 
-    def _passed_on_way(self, name: str, turn: _Turn) -> Collection[str]:
+    def _find_ignored_turning(self, name: str, turn: _Turn) -> Collection[str]:
         """Those whom one who turns need not wait for.
 
         It changes its mind while it can stop before the place where paths cross: there, it would
@@ -593,8 +595,8 @@ class TurningGaps:
         metres = crossing.here[0] - front
         return _Passage(
             metres,
-            _seconds(metres, speed, gains, limit),
-            _seconds(crossing.here[1] + length - front, speed, gains, limit),
+            _seconds_to_reach(metres, speed, gains, limit),
+            _seconds_to_reach(crossing.here[1] + length - front, speed, gains, limit),
         )
 
     def _next_edge(self, name: str, edge: str) -> str | None:
@@ -622,7 +624,7 @@ class TurningGaps:
             waits = self._time_to_line(name, to_line, stops=stops)
             return waits + first / max(inside, 0.1), math.inf
         speed = self._speed_of(name)
-        begins = _seconds(first + to_line, speed, gains, max(inside, speed))
+        begins = _seconds_to_reach(first + to_line, speed, gains, max(inside, speed))
         behind = crossing.there[1] + length + to_line
         if speed < _STANDING and behind > 0.0:  # it is not sure that it goes on
             return begins, math.inf
@@ -632,7 +634,7 @@ class TurningGaps:
         """Seconds to when a vehicle is at its stop line, at least, or if it stood where it is."""
         speed = 0.0 if stops else self._speed_of(name)
         limit = max(self._allowed_of(name), speed)
-        return _seconds(metres, speed, self._body_of(name).gains, limit)
+        return _seconds_to_reach(metres, speed, self._body_of(name).gains, limit)
 
     # ------------------------------------------------------------------------ the network
 
@@ -688,7 +690,7 @@ class TurningGaps:
         """
         lane, links_of = self._sumo.lane, self._lanes.links_of
         own = self._lanes.of_edge[pair[0]]
-        found: dict[str, _Turn] = {}
+        turns: dict[str, _Turn] = {}
         for source in own:
             for link in links_of[source]:
                 onto, via = link[0], link[4]
@@ -710,8 +712,8 @@ class TurningGaps:
                         inside,
                         near,
                     )
-                    found |= {source: turn, waiting: turn, beyond: turn}
-        return {**dict.fromkeys(own), **found} if found else {}
+                    turns |= {source: turn, waiting: turn, beyond: turn}
+        return {**dict.fromkeys(own), **turns} if turns else {}
 
     def _find_approaches(
         self, source: str, onto: str, beyond: str
@@ -720,7 +722,7 @@ class TurningGaps:
         lane = self._sumo.lane
         shape, edge_of, links_of = lane.getShape, lane.getEdgeID, self._lanes.links_of
         first, own = set(lane.getFoes(source, onto)), np.array(shape(beyond))
-        found: dict[str, list[tuple[_Crossing, float]]] = defaultdict(list)
+        approaches: dict[str, list[tuple[_Crossing, float]]] = defaultdict(list)
         crossed: dict[str, list[tuple[_Crossing, float]]] = defaultdict(list)
         for other, other_onto, via in self._find_entries[self._junction_behind(source)]:
             if other not in first or edge_of(other_onto) == edge_of(onto):
@@ -739,10 +741,10 @@ class TurningGaps:
                 crossed[part].append((crossing, to_line))
                 to_line -= lane.getLength(part)
             for name, rest in self._list_upstream(other):
-                found[name].append((crossing, rest))
+                approaches[name].append((crossing, rest))
         before, inside = (
             tuple((name, tuple(paths)) for name, paths in lanes.items())
-            for lanes in (found, crossed)
+            for lanes in (approaches, crossed)
         )
         return before, inside
 
@@ -803,19 +805,19 @@ class TurningGaps:
 
     def _list_upstream(self, last: str) -> list[tuple[str, float]]:
         """Lanes that lead to a stop line, with the metres from their begin to it."""
-        found, ahead, known = [], [(last, 0.0)], {last}
+        upstream_lanes, ahead, known = [], [(last, 0.0)], {last}
         while ahead:
             name, rest = ahead.pop()
             to_line = rest + self._sumo.lane.getLength(name)
-            found.append((name, to_line))
+            upstream_lanes.append((name, to_line))
             if to_line < _SIGHT:
                 more = [lane for lane in self._find_before[name] if lane not in known]
                 known.update(more)
                 ahead += [(lane, to_line) for lane in more]
-        return found
+        return upstream_lanes
 
 
-def _seconds(metres: float, speed: float, gains: float, limit: float) -> float:
+def _seconds_to_reach(metres: float, speed: float, gains: float, limit: float) -> float:
     """Seconds that metres take at least, from a speed up to a limit."""
     if metres <= 0.0:
         return 0.0

@@ -138,20 +138,20 @@ class BodyContacts:
         begun: list[tuple[_Swept, _Swept, float]] = []
         seen: dict[str, _Motion] = {}
         for name in sorted(moved):
-            one = view.actor(name)
-            if one is None:
+            body = view.actor(name)
+            if body is None:
                 continue
-            seen[name] = _Motion(one.x, one.y, one.hdg, one.speed)
-            for other in self._possible_contacts(one, road, view, moves, step):
+            seen[name] = _Motion(body.x, body.y, body.hdg, body.speed)
+            for other in self._possible_contacts(body, road, view, moves, step):
                 seen[other.id] = _Motion(other.x, other.y, other.hdg, other.speed)
-                pair = min(one.id, other.id), max(one.id, other.id)
+                pair = min(body.id, other.id), max(body.id, other.id)
                 if pair in touching:
                     continue
                 if pair in self._touching:
-                    if overlap(one.corners, other.corners):
+                    if overlap(body.corners, other.corners):
                         touching.add(pair)
                     continue
-                swept = self._swept(one, step), self._swept(other, step)
+                swept = self._sweep_body(body, step), self._sweep_body(other, step)
                 back = _first_contact(*swept, step)
                 if back is not None:
                     touching.add(pair)
@@ -165,7 +165,7 @@ class BodyContacts:
             or self._has_exact_instant(one.now, other.now)
         ]
 
-    def _swept(self, body: ActorView, step: float) -> _Swept:
+    def _sweep_body(self, body: ActorView, step: float) -> _Swept:
         return _Swept(body, self._before.get(body.id), step)
 
     def leave_out_known(self, events: list[Event], time: float, step: float) -> None:
@@ -200,7 +200,7 @@ class BodyContacts:
         time = view.time
         for name in view.names:
             seen = None if name in moves else self._seen.get(name)
-            if seen is not None and _still_far(actor_view, seen[1], time - seen[0]):
+            if seen is not None and _is_still_far(actor_view, seen[1], time - seen[0]):
                 continue
             other = view.actor(name)
             if other is None or other is actor_view:
@@ -219,7 +219,7 @@ class BodyContacts:
                     yield found
 
 
-def _still_far(one: ActorView, other: ActorView, seconds: float) -> bool:
+def _is_still_far(one: ActorView, other: ActorView, seconds: float) -> bool:
     """Whether one that SUMO drives cannot be near yet, so long after it was seen."""
     if seconds > _LONG:
         return False

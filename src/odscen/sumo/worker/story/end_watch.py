@@ -100,10 +100,10 @@ class EndWatch:
         for planned in self._actors:
             if planned.id in self._gone:
                 continue
-            found: ActorView | None = stranger(road, planned, self._plan.net_offset)
-            if found is not None:
+            view: ActorView | None = stranger(road, planned, self._plan.net_offset)
+            if view is not None:
                 self._seen.add(planned.id)
-                moves = moves or found.speed >= _STANDING
+                moves = moves or view.speed >= _STANDING
             elif planned.id in self._seen and not road.knows(planned.id):
                 self._gone.add(planned.id)
         if moves:

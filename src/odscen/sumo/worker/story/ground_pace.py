@@ -99,4 +99,4 @@ class GroundPaces:
 
     def restore(self, state: Mapping[str, Any]) -> None:
         """Inverse of :meth:`state`."""
-        self._paces = {name: _Pace(**one) for name, one in state.items()}
+        self._paces = {name: _Pace(**pace) for name, pace in state.items()}

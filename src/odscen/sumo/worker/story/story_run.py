@@ -18,7 +18,7 @@ from odscen.sumo.worker.story.body_contacts import BodyContacts
 from odscen.sumo.worker.story.end_watch import EndWatch
 from odscen.sumo.worker.story.ground_pace import GroundPaces
 from odscen.sumo.worker.story.saved_walks import mend_walks
-from odscen.sumo.worker.story.story_hands import StoryHands
+from odscen.sumo.worker.story.story_effects import StoryEffects
 from odscen.sumo.worker.story.story_view import StoryView
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class StoryRun:
         )
         self._read_wishes(story)
         self._end = EndWatch(plan, self._view)
-        self._hands = StoryHands(
+        self._effects = StoryEffects(
             story, self._planned, net_offset=plan.net_offset, step=plan.step_length
         )
         self._rules = story.rules
@@ -121,7 +121,7 @@ class StoryRun:
     def begin(self, session: Session) -> None:
         """Begin with a simulation; after a saved state, do again what the state does not hold."""
         self._road = session.moved_actors()
-        self._hands.begin(self._road)
+        self._effects.begin(self._road)
         self._begins = True
         for name, move in self._moves.items():
             self._act_on_actor(self._road, name, move, None)
@@ -136,13 +136,14 @@ class StoryRun:
     def waits(self) -> bool:
         """Whether an actor may appear that is not there yet: the run is not over before."""
         return any(
-            self._hands.held(rule.actor) and self._engine.may_fire(rule.id) for rule in self._rules
+            self._effects.held(rule.actor) and self._engine.may_fire(rule.id)
+            for rule in self._rules
         )
 
     @property
     def over(self) -> bool:
         """Whether a rule has ended the run, or the story has ended and its time after that."""
-        return self._hands.over or self._end.over
+        return self._effects.over or self._end.over
 
     @property
     def moved(self) -> frozenset[str]:
@@ -160,9 +161,9 @@ class StoryRun:
         if recorder.jumps != self._jumps:
             self._jumps = recorder.jumps
             self._look_at_all()
-        self._hands.departures(road)
-        self._view.look(road, time, self._step, self._moved_person_speeds() if moved else {})
-        self._hands.arrivals(road, recorder, time)
+        self._effects.departures(road)
+        self._view.look(road, time, self._step, self._list_moved_person_speeds() if moved else {})
+        self._effects.arrivals(road, recorder, time)
         contacts = self._contacts.look(road, self._view, moved, time, self._step)
         if self._plan.by_story:
             self._contacts.leave_out_known(recorder.events, time, self._step)
@@ -186,8 +187,8 @@ class StoryRun:
         self._said = {}
         if not moved and not wanted and not self._engine.asked:
             return
-        self._lost = self._hands.lost = []
-        self._hands.obey(road, self._engine.asked, time)
+        self._lost = self._effects.lost = []
+        self._effects.obey(road, self._engine.asked, time)
         self._moves = {}
         for name, move in wanted.items():
             if self._view.actor(name) is not None:
@@ -202,7 +203,7 @@ class StoryRun:
         self._engine.look_at_all()
         self._contacts.look_at_all()
 
-    def _moved_person_speeds(self) -> dict[str, float]:
+    def _list_moved_person_speeds(self) -> dict[str, float]:
         """Speeds of persons that rules have moved, m/s."""
         return {
             name: move.speed or 0.0
@@ -221,13 +222,13 @@ class StoryRun:
             "engine": self._engine.state(),
             "view": self._view.state(),
             "contacts": self._contacts.state(),
-            "hands": self._hands.state(),
+            "hands": self._effects.state(),
             "goal_edges": self._goal_edges,
             "sent": self._sent,
             "moves": {name: asdict(move) for name, move in self._moves.items()},
             "fastest": self._fastest,
             "waits": {name: list(pose) for name, pose in self._waits.items()},
-            "walks": {name: [list(one.edges), one.arrival] for name, one in self._walks.items()},
+            "walks": {name: [list(walk.edges), walk.arrival] for name, walk in self._walks.items()},
             "end": self._end.state(),
             "paces": self._paces.state(),
         }
@@ -237,7 +238,7 @@ class StoryRun:
         self._engine.restore(state["engine"])
         self._view.restore(state["view"])
         self._contacts.restore(state["contacts"])
-        self._hands.restore(state["hands"])
+        self._effects.restore(state["hands"])
         if "end" in state:
             self._end.restore(state["end"])
         self._paces.restore(state.get("paces", {}))
@@ -313,7 +314,7 @@ class StoryRun:
         """Keep the goal of a vehicle that is put somewhere: SUMO forgets its route beside it."""
         if move.goal is not None:
             self._goal_edges.pop(name, None)
-            self._hands.new_goal(road, name, move.goal, self._view.time)
+            self._effects.new_goal(road, name, move.goal, self._view.time)
         if move.pose is not None:
             self._goal_edges.setdefault(name, road.goal_edge(name))
             return
@@ -349,8 +350,8 @@ class StoryRun:
         if move.rejoins and name in self._walks:
             if self._resume_walk(road, name, self._walks[name]):
                 del self._walks[name]
-            elif (one := self._view.actor(name)) is not None:
-                self._waits[name] = Pose(one.x, one.y, one.hdg)
+            elif (body := self._view.actor(name)) is not None:
+                self._waits[name] = Pose(body.x, body.y, body.hdg)
                 why = "there is no sidewalk to resume its walk on; it stays where it is"
                 self._lose_way(name, why)
         if (pose := self._waits.get(name)) is not None:
@@ -363,7 +364,7 @@ class StoryRun:
             road.walk_speed(name, speed)
 
     def _new_walk(self, road: MovedActors, name: str, move: WantedMove) -> None:
-        walk = self._hands.new_goal(road, name, move.goal or "", self._view.time)
+        walk = self._effects.new_goal(road, name, move.goal or "", self._view.time)
         if walk is not None and (name in self._walks or move.pose is not None):
             self._walks[name] = walk
         elif walk is not None and not self._resume_walk(road, name, walk):
@@ -379,23 +380,25 @@ class StoryRun:
         half = self._actors[name].length / 2.0
         x = pose.x + half * math.cos(pose.hdg) + self._offset[0]
         y = pose.y + half * math.sin(pose.hdg) + self._offset[1]
-        road.put_person(name, x, y, float(angle_deg_from_hdg(pose.hdg)))
+        angle = float(angle_deg_from_hdg(pose.hdg))
+        # Who goes nowhere, as those of recordings, need not find back to a walk.
+        road.put_person(name, x, y, angle, only_on_lanes=name in self._plan.without_goal)
 
     def _lose_way(self, name: str, why: str) -> None:
         """Say that SUMO cannot lead an actor on; a person would end it in a fault."""
-        one = self._view.actor(name)
-        x, y = (None, None) if one is None else (one.x, one.y)
+        body = self._view.actor(name)
+        x, y = (None, None) if body is None else (body.x, body.y)
         time = self._view.time
         self._lost.append(Event(time, EventKind.RULE_FAILED, name, x=x, y=y, detail=why))
 
     def _rule_event(self, event: StoryEvent) -> Event:
-        one = self._view.actor(event.actor)
+        body = self._view.actor(event.actor)
         return Event(
             event.time,
             EventKind(f"rule_{event.what}"),
             event.actor,
-            x=None if one is None else one.x,
-            y=None if one is None else one.y,
+            x=None if body is None else body.x,
+            y=None if body is None else body.y,
             detail=event.detail,
             rule=event.rule,
             values=event.values,

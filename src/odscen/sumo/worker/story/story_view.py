@@ -100,7 +100,7 @@ class StoryView:
         self._before, self._views, self._restored = self._restored or self._views, {}, {}
         if self._eager is None:
             own = self._actors.items()
-            self._eager = tuple(name for name, one in own if one.person or name in self.always)
+            self._eager = tuple(name for name, actor in own if actor.person or name in self.always)
         for name in self._eager:
             self.actor(name)
 
@@ -114,13 +114,13 @@ class StoryView:
         if name in views:
             return views[name]
         planned = self._actors.get(name)
-        found = None
+        view = None
         if planned is not None and name not in self._gone:
-            found = self._view_person(planned) if planned.person else self._view_vehicle(planned)
-            if found is None and name in self._gains and not self._road.knows(name):
+            view = self._view_person(planned) if planned.person else self._view_vehicle(planned)
+            if view is None and name in self._gains and not self._road.knows(name):
                 self._gone.add(name)  # asking SUMO for it would cost more than all who are there
-        views[name] = found
-        return found
+        views[name] = view
+        return view
 
     @property
     def names(self) -> Collection[str]:
@@ -143,10 +143,10 @@ class StoryView:
         return name in self._gone
 
     def _required_actor(self, name: str) -> ActorView:
-        one = self.actor(name)
-        if one is None:
+        body = self.actor(name)
+        if body is None:
             raise KeyError(name)
-        return one
+        return body
 
     def place(self, place: str | Point) -> Point:
         """X and y of a place."""
@@ -227,12 +227,12 @@ class StoryView:
         """What has to be remembered, for JSON."""
         return {
             "travelled": self._travelled,
-            "odometers": {name: list(one) for name, one in self._odometers.items()},
+            "odometers": {name: list(odometer) for name, odometer in self._odometers.items()},
             "standing": self._standing,
             "gone": sorted(self._gone),
-            "last": {name: list(one) for name, one in self._last.items()},
+            "last": {name: list(pose) for name, pose in self._last.items()},
             "seen": {
-                n: [one.x, one.y, one.hdg, one.speed] for n, one in self._views.items() if one
+                n: [view.x, view.y, view.hdg, view.speed] for n, view in self._views.items() if view
             },
         }
 
@@ -244,7 +244,7 @@ class StoryView:
         self._standing = dict(state["standing"])
         self._gone = set(state["gone"])
         self._last = {name: (x, y, v) for name, (x, y, v) in state["last"].items()}
-        self._restored = {name: LastPose(*one) for name, one in state.get("seen", {}).items()}
+        self._restored = {name: LastPose(*pose) for name, pose in state.get("seen", {}).items()}
 
     def _lane_position_of(self, place: str | Point) -> tuple[str, float, int]:
         if not isinstance(place, str):

@@ -51,8 +51,8 @@ def call_areas(
         if not loop.walk:
             lengths[loop.before] = max(lengths.get(loop.before, loop.length), loop.ahead)
     lanes = dict[str, list[int]]()
-    for n, one in enumerate(view.movements):
-        if one.drive:
+    for n, movement in enumerate(view.movements):
+        if movement.drive:
             lanes.setdefault(light.links[n].source, []).append(n)
     return tuple(
         CallArea(

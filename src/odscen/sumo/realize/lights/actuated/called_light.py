@@ -80,7 +80,7 @@ def called_light(
         kind.green.stage in ends for kinds in variants.of_stage for kind in kinds if kind.drive
     ):
         return None
-    walks = {n for n, one in enumerate(view.movements) if one.walk}
+    walks = {n for n, movement in enumerate(view.movements) if movement.walk}
     places = waiting_places(light, net, {name: own & walks for name, own in green.items()})
     areas = call_areas(light, view, net, loops)
     callers = CallDetectors(areas, places, buses)

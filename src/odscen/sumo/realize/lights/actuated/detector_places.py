@@ -84,7 +84,7 @@ def _loop_place(loop: PlacedLoop, light: SumoLight, sumo_map: SumoMap) -> _Place
         return tuple(waiting[:1])
     points = _points_along(loop.lane, loop.pos, loop.pos + loop.length, sumo_map)
     if not points:
-        return _before_stop_line(loop, light)
+        return _place_before_stop_line(loop, light)
     return points[0], points[-1]
 
 
@@ -131,7 +131,7 @@ def _points_along(lane: str, begin: float, end: float, sumo_map: SumoMap) -> _Pl
     return tuple(points)
 
 
-def _before_stop_line(loop: PlacedLoop, light: SumoLight) -> _Place:
+def _place_before_stop_line(loop: PlacedLoop, light: SumoLight) -> _Place:
     """Straight back from where a movement of its lane begins, for a lane too short for a node."""
     paths = (light.links[n].path for n in loop.movements)
     (x, y), (x1, y1) = next((path[:2] for path in paths if len(path) > 1), ((0, 0), (0, 0)))

@@ -52,7 +52,7 @@ class StageVariants:
 
     def __init__(self, phases: Sequence[SumoPhase], light: Light) -> None:
         self._light = light
-        self._walks = {n for n, one in enumerate(light.movements) if one.walk}
+        self._walks = {n for n, movement in enumerate(light.movements) if movement.walk}
         groups = _group_movements(phases, light)
         self._program = DesignedProgram(
             JunctionTiming(junction=light.names[0]), light, "actuated", groups=groups
@@ -76,34 +76,34 @@ class StageVariants:
     def way(self, one: StageVariant, other: StageVariant) -> list[SumoPhase]:
         """Phases from one variant to another; a second of its own where nothing has to end."""
         before, behind = one.green.state, other.green.state
-        found = []
+        phases = []
         for seconds, state, name in change_steps(self._program, one.planned, other.planned):
             letters = (
                 _careful_letter(letter, was, then)
                 for letter, was, then in zip(state, before, behind, strict=True)
             )
-            found.append(SumoPhase(seconds, "".join(letters), name))
-        return found or [SumoPhase(1.0, before, one.green.name)]
+            phases.append(SumoPhase(seconds, "".join(letters), name))
+        return phases or [SumoPhase(1.0, before, one.green.name)]
 
     def _variants_of_stage(self, number: int, phase: SumoPhase) -> tuple[StageVariant, ...]:
         """With crossings first; none for a stage in which nobody has green."""
         green = {n for n, letter in enumerate(phase.state) if letter in "Gg"}
         walks, drive = green & self._walks, bool(green - self._walks)
         full = self._planned_stage(phase)
-        found = []
+        variants = []
         if walks or drive:
-            found.append(StageVariant(number, bool(walks), drive, phase, full))
+            variants.append(StageVariant(number, bool(walks), drive, phase, full))
         if walks and drive:
             names = frozenset(self._program.group_of[n] for n in walks if self._is_known(n))
             rest = full._replace(
                 groups=full.groups - names, permissive=full.permissive - names, least=LEAST_CALLED
             )
-            found.append(
+            variants.append(
                 StageVariant(number, False, True, self._without_crossings(phase, full, rest), rest)
             )
         elif drive:
-            found[0] = found[0]._replace(green=shorter(phase))
-        return tuple(found)
+            variants[0] = variants[0]._replace(green=shorter(phase))
+        return tuple(variants)
 
     def _is_known(self, movement: int) -> bool:
         return movement in self._program.group_of
@@ -143,13 +143,13 @@ def _careful_letter(letter: str, was: str, then: str) -> str:
 def _group_movements(phases: Sequence[SumoPhase], light: Light) -> dict[str, DesignedGroup]:
     """Movements of one approach that always show the same, but for who gives way."""
     columns: dict[tuple[str, ...], list[int]] = {}
-    for n, one in enumerate(light.movements):
-        if one.turn:
+    for n, movement in enumerate(light.movements):
+        if movement.turn:
             shown = (phase.state[n].lower() for phase in phases)
-            columns.setdefault((one.approach, str(one.walk), *shown), []).append(n)
-    found = {}
+            columns.setdefault((movement.approach, str(movement.walk), *shown), []).append(n)
+    groups = {}
     for number, movements in enumerate(columns.values()):
         walk = light.movements[movements[0]].walk
         yellow = max(light.movements[n].yellow for n in movements)
-        found[str(number)] = DesignedGroup(str(number), tuple(movements), walk, yellow)
-    return found
+        groups[str(number)] = DesignedGroup(str(number), tuple(movements), walk, yellow)
+    return groups

@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from odscen.sumo.worker.simulation.moved_actors import MovedActors
 
 
-class StoryHands:
-    """Does it, and does again what a saved state does not hold.
+class StoryEffects:
+    """Puts actors on the road, switches lights and leads to goals, as rules ask.
+
+    After a saved state is loaded it does again what such a state does not hold.
 
     Attributes
     ----------
@@ -45,8 +47,9 @@ class StoryHands:
         self._actors = actors
         self._offset, self._step = net_offset, step
         self._added: set[str] = set()
-        self._dark: dict[str, str] = {}
-        self._goals: dict[str, str] = {}
+        self._dark: dict[str, str] = {}  # program of each light before it went dark
+        self._goals: dict[str, str] = {}  # place in the plan, by actor
+        # Speeds faster than SUMO lets the actors depart; they are given a step later.
         self._faster: dict[str, float] = {}
 
     def begin(self, road: MovedActors) -> None:
@@ -78,28 +81,29 @@ class StoryHands:
     def arrivals(self, road: MovedActors, recorder: Recorder, time: float) -> None:
         """Let those arrive who have come to the goal that a rule has given them."""
         for name, place in list(self._goals.items()):
-            known = self._plan.places[place]
+            goal = self._plan.places[place]
             if road.vehicle(name) is None:
                 del self._goals[name]
                 continue
             edge, pos, _ = road.road_place(name)
-            if edge == known.edge and pos >= known.pos + self._actors[name].length / 2.0:
+            # SUMO has the front of a vehicle, and a goal is reached by its centre.
+            if edge == goal.edge and pos >= goal.pos + self._actors[name].length / 2.0:
                 del self._goals[name]
                 road.arrive(name)
                 recorder.arrive(time, name)
 
     def new_goal(self, road: MovedActors, name: str, place: str, time: float) -> SavedWalk | None:
         """Lead an actor to a node; of a person, the walk there."""
-        known = self._plan.places[place]
+        target = self._plan.places[place]
         actor = self._actors[name]
-        if known.edge is None:
-            self._lose_actor(name, time, f"{place!r} is not on SUMO's network")
+        if target.edge is None:
+            self._report_failure(name, time, f"{place!r} is not on SUMO's network")
         elif actor.person:
-            return SavedWalk((known.edge,), known.pos)
-        elif road.lead_to(name, known.edge, through=True):
+            return SavedWalk((target.edge,), target.pos)
+        elif road.lead_to(name, target.edge, through=True):
             self._goals[name] = place
         else:
-            self._lose_actor(name, time, f"no route leads from here to {place!r}")
+            self._report_failure(name, time, f"no route leads from here to {place!r}")
         return None
 
     def state(self) -> dict[str, Any]:
@@ -120,18 +124,18 @@ class StoryHands:
     def _put_on_road(self, road: MovedActors, wanted_actor: WantedActor, time: float) -> None:
         held = self._plan.held.get(wanted_actor.actor)
         if held is None or wanted_actor.actor in self._added:
-            self._lose_actor(
+            self._report_failure(
                 wanted_actor.actor, time, "it cannot appear: it has no route, or it was there"
             )
             return
         self._added.add(wanted_actor.actor)
         departs_at = road.insert(wanted_actor.actor, held, wanted_actor.speed)
         if departs_at is None:
-            self._lose_actor(wanted_actor.actor, time, "SUMO does not let it appear")
+            self._report_failure(wanted_actor.actor, time, "SUMO does not let it appear")
             return
         if not held.person:
-            own = held.attributes
-            begin = own["departSpeed"] if wanted_actor.speed is None else wanted_actor.speed
+            attributes = held.attributes
+            begin = attributes["departSpeed"] if wanted_actor.speed is None else wanted_actor.speed
             if begin != "avg" and float(begin) > departs_at:
                 self._faster[wanted_actor.actor] = float(begin)
         if wanted_actor.at is not None:
@@ -151,7 +155,7 @@ class StoryHands:
             ):
                 x, y = wanted_actor.at[:2]
                 why = f"it appears where it is placed, as {x:g}, {y:g} is on no lane"
-                self._lose_actor(wanted_actor.actor, time, why)
+                self._report_failure(wanted_actor.actor, time, why)
                 return
             put = road.put_person if held.person else road.put_vehicle
             put(wanted_actor.actor, x, y, float(angle_deg_from_hdg(hdg)))
@@ -166,11 +170,11 @@ class StoryHands:
         if light in self._dark:
             road.run_program(light, self._dark.pop(light))
         if wanted_signal.movement is not None and not road.jump_to_green(light, link):
-            self._lose_actor(
+            self._report_failure(
                 wanted_signal.light,
                 time,
                 f"movement {wanted_signal.movement!r} has green in no stage",
             )
 
-    def _lose_actor(self, name: str, time: float, why: str) -> None:
+    def _report_failure(self, name: str, time: float, why: str) -> None:
         self.lost.append(Event(time, EventKind.RULE_FAILED, name, detail=why))
