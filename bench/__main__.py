@@ -28,6 +28,7 @@ ALL = (
     "signal_timing",
     "assignment",
     "recording",
+    "recorded_hour",
     "short_runs",
     "studies",
     "network_size",

@@ -53,7 +53,7 @@ def schema_types() -> str:
             sys.exit(f"openapi-typescript has failed:\n{done.stdout}{done.stderr}")
         types = target.read_text(encoding="utf-8")
     # The page sends forms as they are.
-    types = re.sub(r'("multipart/form-data": ).*;', r"\1FormData;", types)
+    types = re.sub(r'("multipart/form-data": )(?:\{[^{}]*\}|.*);', r"\1FormData;", types)
     # The generator also writes which methods a path has not, which parameters a method has not,
     # and that answers may have headers of any name.
     types = re.sub(r"^ +\w+\?: never;\n", "", types, flags=re.MULTILINE)

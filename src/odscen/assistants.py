@@ -157,7 +157,7 @@ class Tools:
                 json.loads(rule.model_dump_json(exclude_defaults=True))
                 for rule in document.rules[:MOST_ROWS]
             ],
-            "parameters": {key: one.value for key, one in document.parameters.items()},
+            "parameters": {key: parameter.value for key, parameter in document.parameters.items()},
             "formulas": dict(document.formulas),
             "problems": [str(problem) for problem in problems[:MOST_ROWS]],
             "undo": Editing(self._workspace, file).undo_label,

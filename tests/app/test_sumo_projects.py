@@ -33,7 +33,7 @@ from odscen.scenario.document.json_form import dumps, loads
 from odscen.scenario.document.measures_document import RoadClosure
 from odscen.scenario.document.scenario_document import Scenario
 from odscen.scenario.document.sumo_document import SumoFile
-from odscen.sumo.realize.project_files import _made_harmless, allowed_options
+from odscen.sumo.realize.project_files import _neutralise_paths, allowed_options
 
 BIN = Path(sumo.SUMO_HOME) / "bin"
 PROJECTS = Path(
@@ -620,7 +620,7 @@ def test_twelve_wrong_networks_are_refused_with_file_and_reason(
 
 def test_a_document_cannot_make_sumo_write_elsewhere() -> None:
     text = '<additional><edgeData id="x" file="/etc/passwd"/><a output="host:99"/></additional>'
-    harmless = read_xml(_made_harmless(read_xml(text), text))
+    harmless = read_xml(_neutralise_paths(read_xml(text), text))
     assert [e.get("file", e.get("output")) for e in harmless] == ["passwd", "host_99"]
     assert allowed_options({"fcd-output": "x", "device.emissions.probability": "1"}) == {
         "device.emissions.probability": "1"

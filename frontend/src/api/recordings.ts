@@ -37,6 +37,11 @@ export const recordings = {
     const { job } = await call("post", "/api/recordings/{name}/map", { ...named(name), body: place });
     await followJob(job, onStep);
   },
+  /** Looks for its scenes, or waits until they have been found; false if that was cancelled. */
+  search: async (name: string, onStep: Step): Promise<boolean> => {
+    const { job } = await call("post", "/api/recordings/{name}/search", named(name));
+    return (await followJob(job, onStep)) !== null;
+  },
   pictureUrl: (name: string) => address("/api/recordings/{name}/picture", named(name)),
   momentsUrl: (name: string, begin: number, end: number, most: number) =>
     address("/api/recordings/{name}/moments", { params: { path: { name }, query: { begin, end, most } } }),

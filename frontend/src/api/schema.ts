@@ -798,8 +798,17 @@ export interface paths {
         /**
          * Add Sent Recording
          * @description Keep a recording, in the background; the result is its name.
+         *
+         *     The scenes of a large one are looked for when it is there.
          */
         post: operations["add_sent_recording_api_recordings_post"];
+    };
+    "/api/recordings/{name}/search": {
+        /**
+         * Search Scenes
+         * @description Look for the scenes of a recording, in the background; the job that does so, if one does.
+         */
+        post: operations["search_scenes_api_recordings__name__search_post"];
     };
     "/api/recordings/{name}": {
         /**
@@ -1279,11 +1288,6 @@ export interface components {
             importer?: string | null;
             /** @description Of the importer, a JSON object. */
             options?: string | null;
-        };
-        Body_add_sent_recording_api_recordings_post: {
-            /** @description A recording, the files that belong to it, and if need be its map. */
-            files: string[];
-            map?: string | null;
         };
         Body_import_files_api_imports__of__post: {
             /** @description A scenario, and if need be its map (.xodr) and catalogs. */
@@ -2719,7 +2723,7 @@ export interface components {
          */
         JunctionTiming: {
             junction: string;
-            control: ("fixed" | "actuated") | null;
+            control: ("fixed" | "extended" | "actuated") | null;
             /** @default 0 */
             offset: number;
             /** @default [] */
@@ -2935,7 +2939,7 @@ export interface components {
             id: string;
             junctions: string[];
             /** @enum {string} */
-            control: "fixed" | "actuated";
+            control: "fixed" | "extended" | "actuated";
             /** @enum {string} */
             origin: "scenario" | "retimed" | "odscen" | "netconvert" | "file";
             groups: components["schemas"]["LightGroupInfo"][];
@@ -3639,7 +3643,7 @@ export interface components {
         /** @description A scene that meets a criterion; ``value`` is the worst, see ``docs/recordings.md``. */
         RecordedScene: {
             /** @enum {string} */
-            kind: "hard_braking" | "short_ttc" | "lane_change" | "cut_in" | "crossing_pedestrian";
+            kind: "hard_braking" | "short_ttc" | "lane_change" | "cut_in" | "crossing_pedestrian" | "unprotected_left";
             id: string;
             other: string | null;
             begin: number;
@@ -3663,7 +3667,8 @@ export interface components {
          *
          *     ``published_schema`` is that of its file; ``offset`` metres and degrees to the frame of the map;
          *     ``added`` maps that came with it; ``unused`` files that were sent with it and not needed.
-         *     ``origin`` is added to places of moments, ``bounds`` are those of the tracks, metres.
+         *     ``origin`` is added to places of moments, ``bounds`` are those of the tracks, metres. Until it
+         *     has been ``searched`` there are no scenes, and nothing is known of how it lies on its map.
          */
         RecordingInfo: {
             name: string;
@@ -3673,6 +3678,7 @@ export interface components {
             end: number;
             map: string | null;
             published_schema: string;
+            searched: boolean;
             step: number;
             notes: string[];
             added: string[];
@@ -4489,7 +4495,7 @@ export interface components {
         /** @description How often scenes of a kind are. */
         SceneFrequency: {
             /** @enum {string} */
-            kind: "hard_braking" | "short_ttc" | "lane_change" | "cut_in" | "crossing_pedestrian";
+            kind: "hard_braking" | "short_ttc" | "lane_change" | "cut_in" | "crossing_pedestrian" | "unprotected_left";
             count: number;
             per_hour: number | null;
             per_100_km: number | null;
@@ -4983,7 +4989,7 @@ export interface components {
              */
             kind: "set_signal_control";
             /** @enum {string} */
-            control: "fixed" | "actuated";
+            control: "fixed" | "extended" | "actuated";
         };
         /** @description Change fields of :class:`~odscen.scenario.document.scenario_document.Simulation`. */
         SetSimulationEdit: {
@@ -5053,7 +5059,7 @@ export interface components {
              */
             kind: "set_timing";
             junction: string;
-            control?: ("fixed" | "actuated") | null;
+            control?: ("fixed" | "extended" | "actuated") | null;
             offset?: number;
             green?: number[];
             cycle?: number | null;
@@ -5290,7 +5296,10 @@ export interface components {
             movement: string | null;
         };
         /**
-         * @description How traffic lights are run: fixed-time, or actuated (waiting vehicles prolong greens).
+         * @description How traffic lights are run: fixed-time, extended or actuated.
+         *
+         *     Extended lights of the map keep its greens, and prolong each while vehicles follow each other,
+         *     up to a cycle of two minutes. Actuated ones let arriving vehicles call stages and end greens.
          *
          *     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
          *     that waits elsewhere.
@@ -5300,7 +5309,7 @@ export interface components {
              * @default fixed
              * @enum {string}
              */
-            control: "fixed" | "actuated";
+            control: "fixed" | "extended" | "actuated";
             /** @default false */
             bus_priority: boolean;
             /** @default [] */
@@ -8168,6 +8177,22 @@ export interface operations {
         requestBody: {
             content: {
                 "multipart/form-data": FormData;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            202: {
+                content: {
+                    "application/json": components["schemas"]["JobStarted"];
+                };
+            };
+            default: components["responses"]["Error"];
+        };
+    };
+    search_scenes_api_recordings__name__search_post: {
+        parameters: {
+            path: {
+                name: string;
             };
         };
         responses: {

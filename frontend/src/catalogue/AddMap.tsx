@@ -28,7 +28,9 @@ interface Refusal {
   reason: string;
 }
 
-const formatWords = ({ label, suffixes }: MapImporter): string => `${label} (${suffixes.join(", ")})`;
+/** Label of an importer, with its suffixes where it does not say them. */
+const formatWords = ({ label, suffixes }: MapImporter): string =>
+  suffixes.some((suffix) => label.includes(suffix)) ? label : `${label} (${suffixes.join(", ")})`;
 
 /** Scrolls to what has just been shown. */
 const intoSight = (shown: HTMLElement | null): void => shown?.scrollIntoView({ block: "nearest" });

@@ -9,8 +9,14 @@ import { byNameOrId, junctionChoices } from "../ui/choices";
 
 const CONTROLS = localized(() => [
   { value: "fixed", label: t`Fixed-time` },
+  { value: "extended", label: t`Extended` },
   { value: "actuated", label: t`Actuated` },
 ]);
+const CONTROL_NOTES = localized(() => ({
+  fixed: t`Every signal keeps its times.`,
+  extended: t`A green lasts as long as planned, and longer while vehicles follow each other.`,
+  actuated: t`A green is extended while vehicles arrive.`,
+}));
 /** So many junctions are buttons; more are a list that can be searched. */
 const FEW = 12;
 
@@ -87,13 +93,14 @@ export function LightsStep({
           value={control}
           aria-label={t`Signal control`}
           onChange={(value) =>
-            onEdit({ kind: "set_signal_control", control: value === "actuated" ? value : "fixed" })
+            onEdit({
+              kind: "set_signal_control",
+              control: value === "actuated" || value === "extended" ? value : "fixed",
+            })
           }
         />
         <Text size="xs" c="dimmed" mt={4}>
-          {control === "fixed"
-            ? t`Every signal keeps its times.`
-            : t`A green is extended while vehicles arrive.`}
+          {CONTROL_NOTES()[control]}
         </Text>
       </div>
     </>

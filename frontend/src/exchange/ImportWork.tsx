@@ -6,7 +6,7 @@ import { type Import, RECORDED } from "./useImport";
 
 export const XOSC_FILES = ".xosc,.xodr";
 /** Recordings, and the maps that come with them. */
-export const RECORDED_FILES = ".csv,.parquet,.osi,.mcap,.xml,.xodr,.osm";
+export const RECORDED_FILES = ".csv,.parquet,.osi,.mcap,.pkl,.xml,.xodr,.osm,.json";
 
 /** Scrolls to what has just been shown. */
 const intoSight = (shown: HTMLElement | null): void => shown?.scrollIntoView({ block: "nearest" });

@@ -32,9 +32,9 @@ export function DetectorForms({ light, junction, names, editing }: Props) {
   };
   return (
     <div className="signal-forms">
-      {light.control === "fixed" && (
+      {light.control !== "actuated" && (
         <Text size="sm" c="dimmed">
-          <Trans>They act with actuated control only; this light is fixed-time.</Trans>
+          <Trans>They act with actuated control only, which this light does not have.</Trans>
         </Text>
       )}
       {detectors.length === 0 && (

@@ -49,7 +49,7 @@ const SAME = "same";
 export function ProgramControl({ light, junction, places, editing }: Editable & { places: PlaceNames }) {
   const { timing, control, edit } = editing;
   const own = light.origin === "scenario";
-  const all = control === "actuated" ? t`actuated` : t`fixed-time`;
+  const all = { fixed: t`fixed-time`, extended: t`extended`, actuated: t`actuated` }[control];
   return (
     <>
       <Select
@@ -57,12 +57,15 @@ export function ProgramControl({ light, junction, places, editing }: Editable & 
         data={[
           { value: SAME, label: t`As all lights of the scenario (${all})` },
           { value: "fixed", label: t`Fixed-time` },
+          ...(own
+            ? []
+            : [{ value: "extended", label: t`Extended: fixed-time, longer while vehicles follow` }]),
           { value: "actuated", label: t`Actuated: vehicles and pedestrians call` },
         ]}
         value={timing?.control ?? SAME}
         allowDeselect={false}
         onChange={(value) => {
-          const next = value === "fixed" || value === "actuated" ? value : null;
+          const next = value === "fixed" || value === "extended" || value === "actuated" ? value : null;
           if (value)
             void edit(
               { kind: "set_timing", junction, control: next },

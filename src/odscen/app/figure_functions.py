@@ -37,14 +37,14 @@ class InstalledFigure(NamedTuple):
 def installed_figures() -> tuple[InstalledFigure, ...]:
     """Figures of installed packages by name, with the first line of what each says of itself."""
     names = {entry_point.name for entry_point in entry_points(group=GROUP)} - {*names_of("run")}
-    found = []
+    figures = []
     for name in sorted(names):
         try:
-            said = inspect.getdoc(_import_function(name)) or ""
-            found.append(InstalledFigure(name, said.partition("\n")[0]))
+            documentation = inspect.getdoc(_import_function(name)) or ""
+            figures.append(InstalledFigure(name, documentation.partition("\n")[0]))
         except InputError as error:
-            found.append(InstalledFigure(name, "", error.problem))
-    return tuple(found)
+            figures.append(InstalledFigure(name, "", error.problem))
+    return tuple(figures)
 
 
 def is_installed(name: str) -> bool:

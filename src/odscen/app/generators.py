@@ -275,8 +275,8 @@ class _Command:
             ) from error
         if done.returncode:
             lines = done.stderr.decode("utf-8", "replace").strip().splitlines()[-_LAST_LINES:]
-            said = f": {' / '.join(lines)}" if lines else ""
-            raise InputError(f"it ended with exit code {done.returncode}{said}", element=words[0])
+            output = f": {' / '.join(lines)}" if lines else ""
+            raise InputError(f"it ended with exit code {done.returncode}{output}", element=words[0])
 
 
 def _file_arguments(given: Path, made: Path) -> dict[str, str]:

@@ -132,7 +132,7 @@ class MapComparison:
             "capacity": [
                 {
                     "level": row.level,
-                    "networks": {name: one._asdict() for name, one in row.networks.items()},
+                    "networks": {name: network._asdict() for name, network in row.networks.items()},
                 }
                 for row in self.capacity
             ],
@@ -332,14 +332,14 @@ def _run_on_each_network(
     for converter, run in zip(
         [name for name in entries for _ in settings.seeds], ended, strict=True
     ):
-        by_converter.setdefault(converter, []).append(_of_run(run))
+        by_converter.setdefault(converter, []).append(_read_carried_traffic(run))
     return {
         converter: CarriedTraffic(*np.mean(np.array(some), axis=0).tolist())
         for converter, some in by_converter.items()
     }
 
 
-def _of_run(run: Run) -> CarriedTraffic:
+def _read_carried_traffic(run: Run) -> CarriedTraffic:
     if run.known["error"]:
         raise ToolError(f"a run of the comparison failed: {run.known['error']}")
     end, counts = float(run.known["sim_seconds"]), run.counts

@@ -133,10 +133,10 @@ def _rebuild_map(workspace: Workspace, folder: Path, step: RepairStep) -> Repair
 
 def _built_anew(workspace: Workspace, folder: Path) -> tuple[MapEntry, bool]:
     """Build a map anew; also whether with the usual settings, for want of its own."""
-    xodr, said = folder / XODR_FILE, _said_of_sources(folder)
+    xodr, digests = folder / XODR_FILE, _find_source_digests(folder)
 
     def is_intact(file: Path) -> bool:
-        return file.is_file() and file_digest(file) in said
+        return file.is_file() and file_digest(file) in digests
 
     try:
         entry = read_entry(folder)
@@ -161,17 +161,17 @@ def _built_anew(workspace: Workspace, folder: Path) -> tuple[MapEntry, bool]:
     return workspace.add_map(xodr, name=folder.name, settings=entry.conversion), False
 
 
-def _said_of_sources(folder: Path) -> set[str]:
+def _find_source_digests(folder: Path) -> set[str]:
     """SHA-256 of the files that a map is built from, wherever its folder says it.
 
     A damaged list or ``map.json`` may be asked, too: no damage makes it name the file's own.
     """
-    said = set()
+    digests = set()
     for name in (SUMS_FILE, INFO_FILE):
         with suppress(OSError):
             text = (folder / name).read_text(encoding="utf-8", errors="replace")
-            said |= set(re.findall(r"\b[0-9a-f]{64}\b", text))
-    return said
+            digests |= set(re.findall(r"\b[0-9a-f]{64}\b", text))
+    return digests
 
 
 def set_aside(path: Path, root: Path) -> Path:

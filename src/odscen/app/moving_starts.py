@@ -94,10 +94,13 @@ def driven_fill(
     InputError
         If SUMO does not get through.
     """
-    vehicles = [one for one in actors if one.category is not Category.PEDESTRIAN]
+    vehicles = [actor for actor in actors if actor.category is not Category.PEDESTRIAN]
     lanes = region.graph.lanes
     allowed = np.stack(
-        [request.allowed.get(one, np.zeros(len(lanes.x), dtype=np.bool_)) for one in VEHICLES]
+        [
+            request.allowed.get(category, np.zeros(len(lanes.x), dtype=np.bool_))
+            for category in VEHICLES
+        ]
     )
     before = signals_at(loaded, moment - seconds)
     kilometres = float(allowed.any(axis=0).sum()) * lanes.spacing / 1000.0
@@ -135,7 +138,7 @@ def _count_distance(found: PlacedTraffic, wanted: int) -> float:
 
 
 def _walker_nodes(region: Region, actors: Sequence[Actor]) -> np.ndarray:
-    places = [place_of(region.graph, one.spawn) for one in actors]
+    places = [place_of(region.graph, actor.spawn) for actor in actors]
     return np.array(
         [place.node for place in places if place is not None and place.walk], dtype=np.int64
     )
@@ -201,7 +204,7 @@ def _drive_traffic(
     rows = rows.filter(times > times.max() - 0.01).sort("id")
     node, good = nodes_under(loaded, rows)
     names = [str(category) for category in Category]
-    category = np.array([names.index(one) for one in rows["category"]], dtype=np.int64)
+    category = np.array([names.index(name) for name in rows["category"]], dtype=np.int64)
     good &= allowed[category, node]
     speed = rows["speed"].to_numpy().astype(np.float64)
     return PlacedTraffic(node[good], category[good], speed[good])

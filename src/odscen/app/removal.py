@@ -141,12 +141,12 @@ def _read_known_run(folder: Path) -> KnownRun | None:
     """What the folder of a run says of itself; ``None`` if it is none."""
     state = going(folder)
     if state is not None:
-        said = about(folder)
+        summary = about(folder)
     elif (folder / layout.SUMMARY_FILE).is_file() and not folder.name.startswith("."):
-        said = _read_json_object(folder / layout.SUMMARY_FILE)
+        summary = _read_json_object(folder / layout.SUMMARY_FILE)
     else:
         return None
-    return KnownRun(folder.name, said.get("map"), said.get("map_sha256"), state == "running")
+    return KnownRun(folder.name, summary.get("map"), summary.get("map_sha256"), state == "running")
 
 
 def _scenario_files(workspace: Workspace) -> dict[str, Path]:
@@ -164,10 +164,10 @@ def _map_of(scenario: Path) -> set[str]:
 
 def _skip_sign(sign: re.Pattern[str], text: str, place: int) -> int:
     """Where a sign that is at a place ends; ``ValueError`` if it is not there."""
-    found = sign.match(text, place)
-    if found is None:
+    match = sign.match(text, place)
+    if match is None:
         raise ValueError(sign.pattern)
-    return found.end()
+    return match.end()
 
 
 def _read_early_field(path: Path, key: str) -> object:

@@ -92,16 +92,16 @@ def scenario_files(paths: Iterable[Path]) -> list[Path]:
     InputError
         If a folder has none.
     """
-    found: list[Path] = []
+    files: list[Path] = []
     for path in paths:
         if not path.is_dir():
-            found.append(path)
+            files.append(path)
             continue
         inside = sorted(path.glob(f"*{SUFFIX}"))
         if not inside:
             raise InputError(f"no *{SUFFIX} in this folder", file=str(path))
-        found += inside
-    return found
+        files += inside
+    return files
 
 
 def scenario_name(scenario: Scenario | GivenPath) -> str:

@@ -112,11 +112,11 @@ def why_no_room(
         If a number is unknown or out of its range.
     """
     wanted = tuple(sorted((values or {}).items()))
-    return _why_no_room(find_template(template), workspace.map(map_name), wanted)
+    return _explain_no_room(find_template(template), workspace.map(map_name), wanted)
 
 
 @lru_cache(maxsize=1024)
-def _why_no_room(
+def _explain_no_room(
     template: SceneTemplate, entry: MapEntry, values: tuple[tuple[str, float], ...]
 ) -> str:
     """Look once for each map as it is and numbers: it takes up to seconds."""

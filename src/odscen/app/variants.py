@@ -69,7 +69,7 @@ def read_edits(path: GivenPath) -> list[EditBase]:
                 f"this has {len(ones):,} edits; the limit is {MOST_EDITS:,}. Make a variant of the "
                 "variant, or edit from Python"
             )
-        return [_read_edit(one, place=f"edits[{index}]") for index, one in enumerate(ones)]
+        return [_read_edit(edit, place=f"edits[{index}]") for index, edit in enumerate(ones)]
 
 
 def edits_of_settings(settings: Iterable[str]) -> list[EditBase]:
@@ -150,11 +150,11 @@ def edited(scenario: Scenario, edits: Iterable[EditBase], loaded: LoadedMap) -> 
     ScenarioError
         If an edit is not possible; names it.
     """
-    for index, one in enumerate(edits):
+    for index, edit in enumerate(edits):
         try:
-            scenario = apply_edit(one, scenario, loaded)
+            scenario = apply_edit(edit, scenario, loaded)
         except ScenarioError as error:
-            raise ScenarioError(f"edit {index + 1}, {one.label!r}: {error}") from error
+            raise ScenarioError(f"edit {index + 1}, {edit.label!r}: {error}") from error
     return scenario
 
 

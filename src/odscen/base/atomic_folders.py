@@ -93,8 +93,8 @@ def _private_folder() -> Path:
     folder = Path(tempfile.gettempdir(), name)
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
-    found = folder.lstat()
-    if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077:
+    status = folder.lstat()
+    if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & 0o077:
         _clear_once(folder)
         return folder
     return Path(tempfile.mkdtemp(prefix=f"{name}-"))
@@ -128,12 +128,12 @@ def clear_leftovers(parent: Path) -> list[str]:
         Names of what was removed.
     """
     try:
-        found = sorted(path for path in parent.iterdir() if path.name.startswith("."))
+        leftovers = sorted(path for path in parent.iterdir() if path.name.startswith("."))
     except OSError:
         return []
     kinds = (_BUILDING, _REMOVED, _REPLACED)
     cleared = []
-    for path in found:
+    for path in leftovers:
         is_lock = path.name.endswith(".lock")
         if (is_lock or path.name.startswith(kinds)) and _clear_path(path):
             cleared.append(path.name)

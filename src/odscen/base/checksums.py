@@ -110,15 +110,15 @@ def read_sums(folder: Path) -> dict[str, str] | None:
     lines, mark, own = content.rpartition(b"# ")
     if not mark or own != f"{digest(lines)}\n".encode():
         raise _describe_damage(folder / SUMS_FILE, _read_own_checksum(own.strip()), digest(lines))
-    found = (_LINE.fullmatch(line) for line in lines.decode().splitlines())
-    return {line[2]: line[1] for line in found if line}
+    matches = (_LINE.fullmatch(line) for line in lines.decode().splitlines())
+    return {line[2]: line[1] for line in matches if line}
 
 
 def damaged_files(
     folder: Path, sums: Mapping[str, str], *, may_miss: Collection[str] = ()
 ) -> list[DamagedFile]:
     """Files that are not as the list says; those in ``may_miss`` may have been deleted."""
-    found = []
+    files = []
     for name, expected in sums.items():
         try:
             now = file_digest(folder / name)
@@ -129,8 +129,8 @@ def damaged_files(
         except OSError as error:
             now = error.strerror or str(error)
         if now != expected:
-            found.append(DamagedFile(name, expected, now))
-    return found
+            files.append(DamagedFile(name, expected, now))
+    return files
 
 
 @cache
@@ -183,7 +183,7 @@ def unseal_files(folder: Path, names: Collection[str]) -> None:
     """Forget the checksums of files that are about to be written anew: a kill may come between."""
     sums = read_sums(folder) or {}
     if not sums.keys().isdisjoint(names):
-        write_sums(folder, {name: one for name, one in sums.items() if name not in names})
+        write_sums(folder, {name: digest for name, digest in sums.items() if name not in names})
 
 
 def check_files(
@@ -232,9 +232,9 @@ def unsealed(path: Path) -> dict[str, Any]:
     """
     content = path.read_bytes()
     head, mark, own = content.rpartition(_SEAL.encode())
-    found = digest(head + mark)
-    if mark and own != f'{found}"\n}}\n'.encode():
-        raise _describe_damage(path, _read_own_checksum(own[:64]), found)
+    actual = digest(head + mark)
+    if mark and own != f'{actual}"\n}}\n'.encode():
+        raise _describe_damage(path, _read_own_checksum(own[:64]), actual)
     try:
         data = json.loads(content)
     except (ValueError, RecursionError) as error:
@@ -247,8 +247,8 @@ def unsealed(path: Path) -> dict[str, Any]:
 
 def _read_own_checksum(own: bytes) -> str:
     """The checksum that a file says of itself, if it is one."""
-    said = own.decode("ascii", "replace")
-    return said if _DIGEST.fullmatch(said) else _OWN
+    own_sum = own.decode("ascii", "replace")
+    return own_sum if _DIGEST.fullmatch(own_sum) else _OWN
 
 
 def _describe_damage(path: Path, expected: str, found: str) -> DamagedError:

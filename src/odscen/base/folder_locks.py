@@ -39,7 +39,8 @@ def lock_file(folder: Path) -> Path:
 def locked(folder: Path, *, what: str, patience: float = 0.0) -> Iterator[int]:
     """Hold the lock of a folder, which need not be there; its parent is made.
 
-    Yields the lock's file descriptor: processes that inherit it hold the lock as well.
+    Yields the lock's file descriptor: processes that inherit it hold the lock as well. Of a parent
+    that was made nothing is left if nothing came into it.
 
     Parameters
     ----------
@@ -58,12 +59,7 @@ def locked(folder: Path, *, what: str, patience: float = 0.0) -> Iterator[int]:
         If a file lies where its parent belongs.
     """
     _refuse_undecodable(folder)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-    except FileExistsError as error:  # a file of that name
-        raise NotADirectoryError(
-            errno.ENOTDIR, os.strerror(errno.ENOTDIR), error.filename
-        ) from error
+    absent = [parent for parent in folder.parents if not parent.exists()]
     descriptor = _take_lock(folder, what, patience)
     try:
         yield descriptor
@@ -71,6 +67,18 @@ def locked(folder: Path, *, what: str, patience: float = 0.0) -> Iterator[int]:
         with suppress(OSError):
             lock_file(folder).unlink()  # before it is given back: nobody else has it yet
         os.close(descriptor)
+        with suppress(OSError):  # that are not empty
+            for parent in absent:
+                parent.rmdir()
+
+
+def _make_parent(folder: Path) -> None:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except FileExistsError as error:  # a file of that name
+        raise NotADirectoryError(
+            errno.ENOTDIR, os.strerror(errno.ENOTDIR), error.filename
+        ) from error
 
 
 def _refuse_undecodable(folder: Path) -> None:
@@ -117,7 +125,11 @@ def same_file(descriptor: int, path: Path) -> bool:
 def _take_lock(folder: Path, what: str, patience: float) -> int:
     path, start = lock_file(folder), time.monotonic()
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        _make_parent(folder)
+        try:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except FileNotFoundError:  # another process had made the parent, and has just removed it
+            continue
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if same_file(descriptor, path):

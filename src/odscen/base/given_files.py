@@ -58,13 +58,13 @@ def read_given(file: Path, *, most: int = MOST) -> bytes:
         or cannot be read.
     """
     try:
-        found = file.stat()
-        if not stat.S_ISREG(found.st_mode):
-            what = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe, device or socket"
+        status = file.stat()
+        if not stat.S_ISREG(status.st_mode):
+            what = "a folder" if stat.S_ISDIR(status.st_mode) else "a pipe, device or socket"
             raise InputError(f"this is {what}, not a regular file", file=printable(str(file)))
-        if found.st_size > most:
+        if status.st_size > most:
             raise InputError(
-                f"the file has {found.st_size} bytes; the limit is {most}",
+                f"the file has {status.st_size} bytes; the limit is {most}",
                 file=printable(str(file)),
             )
         return file.read_bytes()

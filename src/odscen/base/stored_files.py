@@ -151,12 +151,12 @@ def _types_of_hint(hint: Any) -> tuple[type, ...]:
     """Types of a hint: those of a union; of a tuple or an object that itself, not what is in it."""
     if get_origin(hint) in (tuple, dict):
         return (get_origin(hint),)
-    return tuple(get_origin(get_argument) or get_argument for get_argument in get_args(hint)) or (
-        hint,
-    )
+    return tuple(get_origin(argument) or argument for argument in get_args(hint)) or (hint,)
 
 
 def _accepted_json_types(types: tuple[type, ...]) -> frozenset[type]:
     """Types of JSON values: a whole number may stand for any, a text for an enumeration."""
-    found = {str if issubclass(kind, str) else kind for kind in types}
-    return frozenset(found | {int} if float in found else found) | (found & {NoneType})
+    json_types = {str if issubclass(kind, str) else kind for kind in types}
+    return frozenset(json_types | {int} if float in json_types else json_types) | (
+        json_types & {NoneType}
+    )

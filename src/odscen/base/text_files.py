@@ -47,12 +47,12 @@ def write_file(path: Path, content: str | bytes) -> Path:
 def clear_parts(folder: Path) -> None:
     """Remove what processes that were killed have left of files, in all of a folder."""
     for part in folder.rglob(".*.part"):
-        known = _PART.fullmatch(part.name)
+        match = _PART.fullmatch(part.name)
         with suppress(OSError):
             if (
-                known is not None
+                match is not None
                 and time.time() - part.stat().st_mtime > _IN_THE_MAKING
-                and not _process_exists(int(known[1]))
+                and not _process_exists(int(match[1]))
             ):
                 part.unlink()
 

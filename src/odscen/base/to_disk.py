@@ -56,10 +56,10 @@ def _begin_to_disk(file: str) -> None:
 @cache
 def _write_out() -> Callable[..., int] | None:
     """``sync_file_range(descriptor, offset, length, flags)`` of Linux, which Python lacks."""
-    found: Callable[..., int] | None = getattr(ctypes.CDLL(None), "sync_file_range", None)
-    if found is not None:
-        found.argtypes = [ctypes.c_int, ctypes.c_int64, ctypes.c_int64, ctypes.c_uint]  # type: ignore[attr-defined]
-    return found
+    sync_file_range: Callable[..., int] | None = getattr(ctypes.CDLL(None), "sync_file_range", None)
+    if sync_file_range is not None:
+        sync_file_range.argtypes = [ctypes.c_int, ctypes.c_int64, ctypes.c_int64, ctypes.c_uint]  # type: ignore[attr-defined]
+    return sync_file_range
 
 
 def write_whole(path: Path, text: str) -> None:

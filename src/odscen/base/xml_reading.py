@@ -44,10 +44,10 @@ def read_xml(text: str | bytes, *, huge: bool = False, bare: bool = False) -> et
     try:
         root = etree.fromstring(data, parser)
     except MemoryError as error:
-        raise _out_of_memory(len(data)) from error
+        raise _make_memory_error(len(data)) from error
     except etree.XMLSyntaxError as error:
         if getattr(error, "code", None) == etree.ErrorTypes.ERR_NO_MEMORY:
-            raise _out_of_memory(len(data)) from error
+            raise _make_memory_error(len(data)) from error
         # What lxml's own text adds is "(<string>, line 1)".
         raise InputError(f"not well-formed XML: {error.msg}") from error
     except (ValueError, LookupError) as error:
@@ -57,7 +57,7 @@ def read_xml(text: str | bytes, *, huge: bool = False, bare: bool = False) -> et
     return root
 
 
-def _out_of_memory(size: int) -> LimitError:
+def _make_memory_error(size: int) -> LimitError:
     return LimitError(
         f"there is not enough memory to read XML of {size} bytes; free some and retry"
     )

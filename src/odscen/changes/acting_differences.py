@@ -76,7 +76,7 @@ def _round_values(value: Any) -> Any:
     if isinstance(value, list):
         return [_round_values(item) for item in value]
     if isinstance(value, dict):
-        return {key: _round_values(one) for key, one in value.items()}
+        return {key: _round_values(part) for key, part in value.items()}
     return value
 
 
@@ -107,7 +107,7 @@ def _plain_rule(rule: Parts, scenario: Parts, names: Mapping[str, str]) -> Parts
     walks = actor.get("category") == Category.PEDESTRIAN
     groups = _condition_groups(rule["when"], rule["actor"], names, negated=False, delay=0.0)
     when = sorted({json.dumps(sorted(group)) for group in groups})
-    then = {str(n): _plain_action(one, walks=walks) for n, one in enumerate(rule["then"])}
+    then = {str(n): _plain_action(action, walks=walks) for n, action in enumerate(rule["then"])}
     return {"actor": rule["actor"], "when": when, "then": then, "times": rule["times"]}
 
 
@@ -134,8 +134,8 @@ def _condition_groups(
         part = part | ({"of": actor} if part.get("of", "") is None else {})
         part |= {"id": names.get(part["id"], part["id"])} if kind == "rule" else {}
         part, negated = _split_bound(part, negated=negated)
-    said = {kind: part, "delay": delay, "negated": negated, "rising": rising}
-    return [{json.dumps(said, sort_keys=True)}]
+    leaf = {kind: part, "delay": delay, "negated": negated, "rising": rising}
+    return [{json.dumps(leaf, sort_keys=True)}]
 
 
 def _split_bound(part: Parts, *, negated: bool) -> tuple[Parts, bool]:
@@ -146,8 +146,8 @@ def _split_bound(part: Parts, *, negated: bool) -> tuple[Parts, bool]:
 
 
 def _without_always(group: set[str]) -> set[str]:
-    said = json.dumps(_ALWAYS | {"delay": 0.0, "negated": False, "rising": False}, sort_keys=True)
-    return group - {said} or group
+    always = json.dumps(_ALWAYS | {"delay": 0.0, "negated": False, "rising": False}, sort_keys=True)
+    return group - {always} or group
 
 
 def _plain_action(action: Parts, *, walks: bool) -> Parts:
@@ -156,12 +156,12 @@ def _plain_action(action: Parts, *, walks: bool) -> Parts:
     (kind,) = (key for key in action if action[key] is not None)
     part: Parts = action[kind]
     if not walks and kind == "brake" and part["hold"] is None:
-        return {"speed": _to_zero(rate=part["by"])}
+        return {"speed": _stop_action(rate=part["by"])}
     if not walks and kind == "stop":
-        return {"speed": _to_zero(within=part["within"])}
+        return {"speed": _stop_action(within=part["within"])}
     return {kind: part}
 
 
-def _to_zero(*, rate: float | None = None, within: float | None = None) -> Parts:
+def _stop_action(*, rate: float | None = None, within: float | None = None) -> Parts:
     shape = "step" if rate is None and within is None else "linear"
     return {"to": 0.0, "shape": shape, "rate": rate, "over": None, "within": within}

@@ -50,16 +50,16 @@ class _PieceDifference(NamedTuple):
 
 def lane_differences(pair: RoadPair) -> Iterator[MapChange]:
     """Differences of the lanes of a road, from the centre line outwards, along s."""
-    found: list[_PieceDifference] = []
+    differences: list[_PieceDifference] = []
     for stretch in pair.stretches:
-        found += _lanes_of(stretch)
+        differences += _lanes_of(stretch)
         for old, new in stretch.pairs:
             if old is not None and new is not None:
-                found += _compare_properties(old, new, stretch)
+                differences += _compare_properties(old, new, stretch)
                 if old.id:
-                    found += _compare_widths(pair, stretch, (old, new))
-    found += _compare_limits(pair)
-    for join_piece in _join_pieces(found):
+                    differences += _compare_widths(pair, stretch, (old, new))
+    differences += _compare_limits(pair)
+    for join_piece in _join_pieces(differences):
         yield _lane_change(pair, join_piece)
 
 
@@ -169,7 +169,7 @@ def _widths_at(table: RoadTable, key: LaneKey, s: FloatArray) -> FloatArray:
 
 def _compare_limits(pair: RoadPair) -> list[_PieceDifference]:
     """Limits as they act, of lanes for motor vehicles: one of the road where all change alike."""
-    found: list[_PieceDifference] = []
+    differences: list[_PieceDifference] = []
     for stretch in pair.stretches:
         lanes = [
             (old, new)
@@ -185,8 +185,8 @@ def _compare_limits(pair: RoadPair) -> list[_PieceDifference]:
         length = stretch.s1 - stretch.s0
         pieces = merged(starts, end=length)
         for low, high in zip(pieces, [*pieces[1:], length], strict=True):
-            found += _limits_of(pair, stretch, lanes, (stretch.s0 + low, stretch.s0 + high))
-    return found
+            differences += _limits_of(pair, stretch, lanes, (stretch.s0 + low, stretch.s0 + high))
+    return differences
 
 
 def _speeds_of_road(road: Road) -> Iterable[Any]:
@@ -216,10 +216,10 @@ def _limits_of(
             )
         )
         values.append((both[0].id, (_describe_limit(old), _describe_limit(new))))
-    changed = [(lane, said) for lane, said in values if said[0] != said[1]]
-    if changed and len(changed) == len(values) and len({said for _, said in changed}) == 1:
+    changed = [(lane, limits) for lane, limits in values if limits[0] != limits[1]]
+    if changed and len(changed) == len(values) and len({limits for _, limits in changed}) == 1:
         return [_PieceDifference("limit", None, changed[0][1], *between)]
-    return [_PieceDifference("limit", lane, said, *between) for lane, said in changed]
+    return [_PieceDifference("limit", lane, limits, *between) for lane, limits in changed]
 
 
 def _describe_limit(value: float) -> str:
@@ -236,16 +236,16 @@ def _join_pieces(found: Iterable[_PieceDifference]) -> list[_PieceDifference]:
     """
     kept: list[_PieceDifference] = []
     open_pieces: dict[tuple[Any, ...], int] = {}
-    for one in found:
-        said = None if one.what == "width" else one.values
-        key = (one.what, one.lane, one.added, said)
+    for piece_difference in found:
+        values = None if piece_difference.what == "width" else piece_difference.values
+        key = (piece_difference.what, piece_difference.lane, piece_difference.added, values)
         at = open_pieces.get(key)
-        if at is not None and abs(kept[at].s1 - one.s0) <= SAME:
-            widest = max(kept[at], one, key=lambda piece: piece.size)
-            kept[at] = widest._replace(s0=kept[at].s0, s1=one.s1)
+        if at is not None and abs(kept[at].s1 - piece_difference.s0) <= SAME:
+            widest = max(kept[at], piece_difference, key=lambda piece: piece.size)
+            kept[at] = widest._replace(s0=kept[at].s0, s1=piece_difference.s1)
         else:
             open_pieces[key] = len(kept)
-            kept.append(one)
+            kept.append(piece_difference)
     return kept
 
 

@@ -179,10 +179,10 @@ def _junction_values(old: Junction, new: Junction, names: Mapping[str, str]) -> 
         f"over road {names.get(priority.low, priority.low)}"
         for priority in new.priorities
     }
-    for said in sorted(ways - others):
-        yield MapChange("removed", "priority", f"priority of {said} at {name}")
-    for said in sorted(others - ways):
-        yield MapChange("added", "priority", f"priority of {said} at {name}")
+    for roads_of_priority in sorted(ways - others):
+        yield MapChange("removed", "priority", f"priority of {roads_of_priority} at {name}")
+    for roads_of_priority in sorted(others - ways):
+        yield MapChange("added", "priority", f"priority of {roads_of_priority} at {name}")
     for what, before, after in (
         ("type", old.type, new.type),
         ("name", old.name, new.name),
@@ -210,10 +210,10 @@ def controller_differences(
         new = after.get(key)
         if new is None:
             continue
-        said = _list_controlled(old.controls), _list_controlled(new.controls)
-        if said[0] != said[1]:
+        controlled = _list_controlled(old.controls), _list_controlled(new.controls)
+        if controlled[0] != controlled[1]:
             subject = f"signals of controller {shown_id(key)}"
-            yield MapChange("changed", "controller", subject, *said)
+            yield MapChange("changed", "controller", subject, *controlled)
 
 
 def _list_controlled(controls: Sequence[tuple[str, str]]) -> str:
@@ -254,12 +254,12 @@ def _compare_attributes(old: Road, new: Road) -> Iterator[MapChange]:
     ):
         if before != after:
             subject = f"{name} of {of_road(old.id)}"
-            said = before or "none", after or "none"
-            yield MapChange("changed", "road", subject, *said, place=place)
+            both = before or "none", after or "none"
+            yield MapChange("changed", "road", subject, *both, place=place)
     if abs(old.length - new.length) > SAME:
-        said = f"{metres(old.length)} m", f"{metres(new.length)} m"
+        both = f"{metres(old.length)} m", f"{metres(new.length)} m"
         place = ChangePlace(old.id, old.length, old.length)
-        yield MapChange("changed", "geometry", f"length of {of_road(old.id)}", *said, place=place)
+        yield MapChange("changed", "geometry", f"length of {of_road(old.id)}", *both, place=place)
 
 
 def _compare_reference_lines(pair: RoadPair) -> Iterator[MapChange]:
@@ -321,12 +321,12 @@ def _compare_road_types(old: Road, new: Road) -> Iterator[MapChange]:
     starts = merged((road_type.s for road in (old, new) for road_type in road.types), end=end)
     before = None
     for s0, s1 in zip(starts, [*starts[1:], end], strict=True):
-        said = _type_at(old, 0.5 * (s0 + s1)), _type_at(new, 0.5 * (s0 + s1))
-        if said[0] != said[1] and said != before:
+        types = _type_at(old, 0.5 * (s0 + s1)), _type_at(new, 0.5 * (s0 + s1))
+        if types[0] != types[1] and types != before:
             subject = f"type of {of_road(old.id)}"
             place = ChangePlace(old.id, s0, s1)
-            yield MapChange("changed", "road type", subject, *said, place=place)
-        before = said
+            yield MapChange("changed", "road type", subject, *types, place=place)
+        before = types
 
 
 def _type_at(road: Road, s: float) -> str:
@@ -339,11 +339,11 @@ def _compare_road_link(
 ) -> Iterator[MapChange]:
     before: RoadLink | None = getattr(old, end)
     after: RoadLink | None = getattr(new, end)
-    said = _link_words(before, None), _link_words(after, roads)
-    if said[0] != said[1]:
+    links = _link_words(before, None), _link_words(after, roads)
+    if links[0] != links[1]:
         at = 0.0 if end == "predecessor" else old.length
         subject = f"{end} of {of_road(old.id)}"
-        yield MapChange("changed", "road link", subject, *said, place=ChangePlace(old.id, at, at))
+        yield MapChange("changed", "road link", subject, *links, place=ChangePlace(old.id, at, at))
 
 
 def _link_words(link: RoadLink | None, roads: Mapping[str, str] | None) -> str:
@@ -599,11 +599,11 @@ def _compare_roads(
 
 def _whole_road_change(road: Road, kind: str) -> MapChange:
     of = f" of junction {road.junction}" if road.junction else ""
-    said = f"{metres(road.length)} m{of}"
+    size = f"{metres(road.length)} m{of}"
     place = ChangePlace(road.id, 0.0, road.length)
     if kind == "added":
-        return MapChange("added", "road", of_road(road.id), None, said, place)
-    return MapChange("removed", "road", of_road(road.id), said, None, place)
+        return MapChange("added", "road", of_road(road.id), None, size, place)
+    return MapChange("removed", "road", of_road(road.id), size, None, place)
 
 
 def _within_roads(pairs: list[RoadPair], names: Mapping[str, str]) -> Iterator[MapChange]:

@@ -43,13 +43,13 @@ def paired_stretches(before: Road, after: Road) -> list[PairedStretch]:
     """
     end = min(before.length, after.length)
     starts = merged((section.s for road in (before, after) for section in road.sections), end=end)
-    found = []
+    stretches = []
     for s0, s1 in zip(starts, [*starts[1:], end], strict=True):
         middle = 0.5 * (s0 + s1)
         sections = _section_at(before, middle), _section_at(after, middle)
         pairs = paired_lanes(before.sections[sections[0]], after.sections[sections[1]])
-        found.append(PairedStretch(s0, s1, sections, pairs))
-    return found
+        stretches.append(PairedStretch(s0, s1, sections, pairs))
+    return stretches
 
 
 def merged(places: Iterable[float], *, end: float) -> list[float]:
@@ -62,7 +62,7 @@ def merged(places: Iterable[float], *, end: float) -> list[float]:
 
 
 def _section_at(road: Road, s: float) -> int:
-    starts = [index for index, one in enumerate(road.sections) if one.s <= s]
+    starts = [index for index, section in enumerate(road.sections) if section.s <= s]
     return starts[-1] if starts else 0
 
 

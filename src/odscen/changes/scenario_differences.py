@@ -58,21 +58,21 @@ class ScenarioChange:
         """One line for people: ``actor van-1, goal: "5.0.-1.3" -> "7.0.-1.9"``."""
         if self.before is None or self.after is None:
             value = self.after or self.before
-            told = f" ({value})" if value else ""
-            return f"{self._describe_subject()}: {self.kind}{told}"
+            in_brackets = f" ({value})" if value else ""
+            return f"{self._describe_subject()}: {self.kind}{in_brackets}"
         return f"{self._describe_subject()}: {self.before} -> {self.after}"
 
     def _describe_subject(self) -> str:
-        said: list[str] = []
+        phrases: list[str] = []
         parts = iter(self.place)
         for part in parts:
             if part.startswith(_NTH):
-                said[-1] += f" {part.removeprefix(_NTH)}"
+                phrases[-1] += f" {part.removeprefix(_NTH)}"
                 continue
             key = next(parts, None) if part in _SINGULAR else None
             name = part.replace("_", " ")
-            said.append(name if key is None else f"{_SINGULAR[part]} {shown_id(key)}")
-        return ", ".join(said)
+            phrases.append(name if key is None else f"{_SINGULAR[part]} {shown_id(key)}")
+        return ", ".join(phrases)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready."""
@@ -119,7 +119,7 @@ def _compare_values(old: Any, new: Any, place: tuple[str, ...]) -> Iterator[Scen
             None,
         )
         if name is not None:
-            yield from _by_name(old, new, place, name)
+            yield from _compare_by_name(old, new, place, name)
         elif len(old) == len(new) and all(isinstance(row, dict) for row in entries):
             for number, (before, after) in enumerate(zip(old, new, strict=True), start=1):
                 yield from _compare_values(before, after, (*place, f"{_NTH}{number}"))
@@ -129,19 +129,19 @@ def _compare_values(old: Any, new: Any, place: tuple[str, ...]) -> Iterator[Scen
         yield ScenarioChange("changed", place, _format_value(old), _format_value(new))
 
 
-def _by_name(
+def _compare_by_name(
     old: Sequence[dict[str, Any]], new: Sequence[dict[str, Any]], place: tuple[str, ...], name: str
 ) -> Iterator[ScenarioChange]:
     was = {part[name]: part for part in old}
     now = {part[name]: part for part in new}
-    for key, one in was.items():
+    for key, content in was.items():
         if key in now:
-            yield from _compare_fields(one, now[key], (*place, key))
+            yield from _compare_fields(content, now[key], (*place, key))
         else:
-            yield ScenarioChange("removed", (*place, key), _describe_timing(one, name))
-    for key, one in now.items():
+            yield ScenarioChange("removed", (*place, key), _describe_timing(content, name))
+    for key, content in now.items():
         if key not in was:
-            yield ScenarioChange("added", (*place, key), None, _describe_timing(one, name))
+            yield ScenarioChange("added", (*place, key), None, _describe_timing(content, name))
     if [key for key in was if key in now] != [key for key in now if key in was]:
         yield ScenarioChange("changed", (*place, "order"), "as it was", "another")
 
@@ -155,9 +155,9 @@ def _describe_timing(part: Mapping[str, Any], name: str) -> str | None:
 
 def _shorten_lists(old: Sequence[Any], new: Sequence[Any]) -> tuple[str, str]:
     """Short lists whole; of long ones only what is not in the other, with how many it is."""
-    said = _format_value(old), _format_value(new)
-    if max(map(len, said)) <= _LONGEST:
-        return said
+    values = _format_value(old), _format_value(new)
+    if max(map(len, values)) <= _LONGEST:
+        return values
     first, second = (Counter(json.dumps(item) for item in these) for these in (old, new))
     lost, gained = first - second, second - first
     return _describe_count(old, lost), _describe_count(new, gained)

@@ -182,10 +182,10 @@ class MapDrawing:
             If it is not a drawing, or one of another version.
         """
         with stored_document(text, form=FORMAT, version=VERSION, what="a map drawing") as document:
-            return cls._from_document(document)
+            return cls._read_document(document)
 
     @classmethod
-    def _from_document(cls, document: dict[str, Any]) -> MapDrawing:
+    def _read_document(cls, document: dict[str, Any]) -> MapDrawing:
         low_x, low_y, high_x, high_y = map(float, document["bounds"])
         return cls(
             name=str(document["name"]),

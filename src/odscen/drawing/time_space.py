@@ -110,8 +110,10 @@ class _Diagram:
             for turn in range(first, math.ceil(_CYCLES) + 1):
                 shift = turn * self._cycle
                 places = list(zip(band.times, self._lights, strict=True))
-                front = [(self.x(t + shift), self.y(one.metres)) for t, one in places]
-                rear = [(self.x(t + shift + band.seconds), self.y(one.metres)) for t, one in places]
+                front = [(self.x(t + shift), self.y(place.metres)) for t, place in places]
+                rear = [
+                    (self.x(t + shift + band.seconds), self.y(place.metres)) for t, place in places
+                ]
                 points = " ".join(f"{number(x)},{number(y)}" for x, y in (*front, *rear[::-1]))
                 yield element("polygon", points=points, fill=color, fill_opacity=0.22, stroke=color)
 

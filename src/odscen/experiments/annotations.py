@@ -54,9 +54,9 @@ def findings(result: SuiteResult) -> Iterator[Finding]:
     for case in result.worst_first:
         if case.status is not CaseStatus.PASSED:
             file, line = _find_place(result, case)
-            told = [headline(case), *details(case)[:MOST_PROBLEMS]]
+            lines = [headline(case), *details(case)[:MOST_PROBLEMS]]
             title = f"{case.name}: {case.label}"
-            yield Finding(not case.status.passes, file, line, title, "\n".join(told))
+            yield Finding(not case.status.passes, file, line, title, "\n".join(lines))
         for words in case.warnings:
             file = _existing_file(result, case.case.file)
             yield Finding(False, file, 1, f"{case.name}: warning", words)
@@ -103,9 +103,11 @@ def github_annotations(result: SuiteResult) -> str:
         where = ",".join(
             f"{key}={_escape_property(str(value))}"
             for key, value in (
-                ("file", _relative(finding.file)), ("line", finding.line), ("title", finding.title)
+                ("file", _make_relative(finding.file)),
+                ("line", finding.line),
+                ("title", finding.title),
             )
-        )  # fmt: skip
+        )
         level = "error" if finding.failed else "warning"
         lines.append(f"::{level} {where}::{_escape_command(finding.words)}\n")
     return "".join(lines)
@@ -115,7 +117,7 @@ def code_quality(result: SuiteResult) -> str:
     """A code-quality report for GitLab, JSON; the same findings have the same fingerprints."""
     rows = []
     for finding in findings(result):
-        path = _relative(finding.file)
+        path = _make_relative(finding.file)
         known = f"{result.suite.name}\n{path}\n{finding.title}\n{finding.words}"
         rows.append(
             {
@@ -136,7 +138,7 @@ def sarif(result: SuiteResult) -> str:
     """A SARIF 2.1.0 log, JSON; the same findings have the same fingerprints."""
     rows = []
     for finding in findings(result):
-        path = _relative(finding.file)
+        path = _make_relative(finding.file)
         known = f"{result.suite.name}\n{path}\n{finding.title}\n{finding.words}"
         digest = hashlib.sha256(known.encode()).hexdigest()
         place = {
@@ -171,7 +173,7 @@ def _quote_path(path: str) -> str:
     return Path(path).as_uri() if path.startswith("/") else quote(path)
 
 
-def _relative(file: Path) -> str:
+def _make_relative(file: Path) -> str:
     """Path from the working directory, which in CI is that of the repository."""
     full = file.resolve()
     here = Path.cwd().resolve()

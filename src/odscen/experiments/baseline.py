@@ -207,10 +207,10 @@ def read_baseline(file: Path) -> Baseline | None:
     with in_file(str(file)):
         data = read_document(read_given(file), form=FORMAT, version=VERSION, what=what)
         with documents(f"{what}, write it again with --update-baseline"):
-            return _from_data(data)
+            return _baseline_from_data(data)
 
 
-def _from_data(data: Mapping[str, Any]) -> Baseline:
+def _baseline_from_data(data: Mapping[str, Any]) -> Baseline:
     seeds = tuple(int(seed) for seed in data["seeds"])
     figures: dict[FigureKey, tuple[float | None, ...]] = {}
     for row in data["rows"]:

@@ -110,24 +110,24 @@ def criticality(row: Mapping[str, Any]) -> float:
 def _body_tracks(
     table: pl.DataFrame, bodies: Mapping[str, tuple[float, float]]
 ) -> dict[str, _BodyTrack]:
-    found = {}
+    tracks = {}
     times = {time: step for step, time in enumerate(table["time"].unique().sort().to_list())}
     for (name,), rows in table.sort("time").group_by("id", maintain_order=True):
         steps = np.array([times[time] for time in rows["time"].to_list()], dtype=np.int64)
         x, y, hdg = (rows[column].to_numpy().astype(np.float64) for column in ("x", "y", "hdg"))
         length, width = bodies[str(name)]
-        found[str(name)] = _BodyTrack(steps, x, y, hdg, length, width)
-    return dict(sorted(found.items()))
+        tracks[str(name)] = _BodyTrack(steps, x, y, hdg, length, width)
+    return dict(sorted(tracks.items()))
 
 
 def _watched_pairs(
     tracks: Mapping[str, _BodyTrack], watched: Collection[str] | None
 ) -> Iterator[tuple[_BodyTrack, _BodyTrack]]:
     names = [*tracks]
-    for first, one in enumerate(names):
+    for first, name in enumerate(names):
         for other in names[first + 1 :]:
-            if watched is None or one in watched or other in watched:
-                yield tracks[one], tracks[other]
+            if watched is None or name in watched or other in watched:
+                yield tracks[name], tracks[other]
 
 
 def _clearance_between(one: _BodyTrack, other: _BodyTrack) -> float | None:

@@ -240,7 +240,7 @@ def _grade_places(result: RunComparison) -> PlaceStyles:
         for row in result.rows
         if row.key.figure == "vehicles"
     }
-    found: PlaceStyles = {}
+    styles: PlaceStyles = {}
     for row in result.place_rows:
         key = (str(row.key.kind), row.key.place)
         difference = row.difference
@@ -252,8 +252,8 @@ def _grade_places(result: RunComparison) -> PlaceStyles:
         share = worse * abs(difference.difference) / base
         values = (f"{row.key.entry.written(value or 0.0)} in {side}"
                   for value, side in ((difference.a, "A"), (difference.b, "B")))  # fmt: skip
-        found[key] = (grade(share), f"{row.key.entry.label} {', '.join(values)}")
-    return found
+        styles[key] = (grade(share), f"{row.key.entry.label} {', '.join(values)}")
+    return styles
 
 
 def _diagram_section(a: RunSet, b: RunSet) -> Markup | None:

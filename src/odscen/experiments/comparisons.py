@@ -245,7 +245,7 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     else:
         folders = sorted(path.parent for path in folder.glob(f"*/{SUMMARY_FILE}"))
     if not folders:
-        raise InputError(_no_run(folder), file=str(folder))
+        raise InputError(_explain_no_run(folder), file=str(folder))
     runs: dict[int, Measured] = {}
     scenarios: dict[str, None] = {}
     versions: dict[str, None] = {}
@@ -287,7 +287,7 @@ def read_runs(folder: Path, workspace: Workspace | None = None) -> RunSet:
     )
 
 
-def _no_run(folder: Path) -> str:
+def _explain_no_run(folder: Path) -> str:
     """Say what is wanted, with the folders further down that would do."""
     wanted = f"name a run, which has a {SUMMARY_FILE}, or a folder of runs of one scenario"
     deeper = sorted({path.parent.parent for path in folder.glob(f"*/*/{SUMMARY_FILE}")})

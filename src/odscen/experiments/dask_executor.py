@@ -181,7 +181,7 @@ class DaskExecutor:
         lost: float | None = None
         while True:
             with self._open_client(lost) as client:
-                if (yield from self._carried_out(client, orders)):
+                if (yield from self._gather_outcomes(client, orders)):
                     return
             lost = self._lost
 
@@ -200,7 +200,9 @@ class DaskExecutor:
                     ) from None
                 time.sleep(_PAUSE)
 
-    def _carried_out(self, client: Client, orders: Orders) -> Generator[list[Outcome], None, bool]:
+    def _gather_outcomes(
+        self, client: Client, orders: Orders
+    ) -> Generator[list[Outcome], None, bool]:
         """Give outcomes as long as the client lives; whether there are no more."""
         _refuse_workers(client)
         ended: SimpleQueue[Future] = SimpleQueue()
@@ -246,7 +248,9 @@ class DaskExecutor:
 
     def _submit_order(self, client: Client, order: WorkOrder) -> Future:
         maps = {source.map_name: source for source in order.sources.values()}
-        packs = {name: self._pack_map(client, name, one.map_sha256) for name, one in maps.items()}
+        packs = {
+            name: self._pack_map(client, name, map_use.map_sha256) for name, map_use in maps.items()
+        }
         key = f"odscen-order-{uuid.uuid4().hex}"
         return client.submit(carry_out_packed, order, packs, key=key, pure=False)
 
@@ -265,7 +269,7 @@ class DaskExecutor:
         from distributed import KilledWorker
 
         try:
-            found: list[Outcome] = future.result()
+            outcome: list[Outcome] = future.result()
         except KilledWorker as error:
             if not str(error.task).startswith(_MAP_KEY):
                 return self._retry_killed(order)
@@ -274,11 +278,11 @@ class DaskExecutor:
             return self._sent_again(order)
         except (ModuleNotFoundError, AttributeError, ImportError) as error:
             raise ConflictError(f"a worker does not have this odscen: {error}") from error
-        return found
+        return outcome
 
     def _sent_again(self, order: WorkOrder) -> list[Outcome]:
         """Carry out an order again, with maps that are sent anew where they are lost."""
-        kept = {name: one for name, one in self._packs.items() if one.status in _THERE}
+        kept = {name: pack for name, pack in self._packs.items() if pack.status in _THERE}
         self._packs = kept
         self._again.append(order)
         return []

@@ -66,7 +66,7 @@ class MapFacts:
             "seconds": self.seconds,
             "most": dict(self.most),
             "picture": self.picture,
-            "road_users": {name: dict(one) for name, one in self.categories.items()},
+            "road_users": {name: dict(counts) for name, counts in self.categories.items()},
         }
 
 
@@ -77,13 +77,13 @@ def summed(rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     for row in rows:
         seconds += row["seconds"]
         most |= {name: max(size, most.get(name, 0)) for name, size in row["most"].items()}
-        for name, one in row["categories"].items():
+        for name, counts in row["categories"].items():
             whole = categories.setdefault(
                 name, {"tracks": 0, "seconds": 0.0, "metres": 0.0, "speeds": []}
             )
             for key in ("tracks", "seconds", "metres"):
-                whole[key] = round(whole[key] + one[key], 1)
-            whole["speeds"] = _add_counts(whole["speeds"], one["speeds"])
+                whole[key] = round(whole[key] + counts[key], 1)
+            whole["speeds"] = _add_counts(whole["speeds"], counts["speeds"])
     order = [str(category) for category in Category]
     return {
         "seconds": round(seconds, 1),
@@ -145,7 +145,7 @@ class DatasetFacts:
             "name": self.plan.name,
             "licence": self.plan.licence,
             "versions": dict(self.versions),
-            "maps": [one.to_dict() for one in self.maps],
+            "maps": [map_facts.to_dict() for map_facts in self.maps],
             "splits": self.splits(),
             "left_out": dict(self.left_out),
             "plan": self.plan.model_dump(mode="json"),
@@ -196,7 +196,7 @@ def _front_matter(facts: DatasetFacts) -> str:
     plan = facts.plan
     if HUGGINGFACE not in plan.formats:
         return ""
-    splits = [one for one in plan.splits if (facts.table["split"] == one).any()]
+    splits = [split for split in plan.splits if (facts.table["split"] == split).any()]
     lines = [
         "---",
         f"pretty_name: {json.dumps(plan.name)}",
@@ -230,12 +230,18 @@ def _describe_formats(facts: DatasetFacts) -> str:
 def _road_users(facts: DatasetFacts) -> str:
     rows: list[list[object]] = []
     for split in facts.plan.splits:
-        own = [one for one in facts.maps if one.split == split]
+        own = [map_facts for map_facts in facts.maps if map_facts.split == split]
         whole = summed(
-            {"seconds": one.seconds, "most": one.most, "categories": one.categories} for one in own
+            {
+                "seconds": map_facts.seconds,
+                "most": map_facts.most,
+                "categories": map_facts.categories,
+            }
+            for map_facts in own
         )
         rows += [
-            [split, name, *_describe_tracks([one])] for name, one in whole["categories"].items()
+            [split, name, *_describe_tracks([counts])]
+            for name, counts in whole["categories"].items()
         ]
     heads = ["split", "category", *_OF_TRACKS]
     return (
@@ -251,15 +257,15 @@ _OF_TRACKS: Final = (
 
 def _describe_tracks(parts: Sequence[Mapping[str, Any]]) -> list[object]:
     """Numbers of the columns :data:`_OF_TRACKS`."""
-    seconds, metres = (sum(one[key] for one in parts) for key in ("seconds", "metres"))
+    seconds, metres = (sum(part[key] for part in parts) for key in ("seconds", "metres"))
     counts: list[int] = []
-    for one in parts:
-        counts = _add_counts(counts, one["speeds"])
+    for part in parts:
+        counts = _add_counts(counts, part["speeds"])
     states = np.array(counts, dtype=np.float64)
     if not states.sum():
-        return [sum(one["tracks"] for one in parts), 0, 0, None, None, None, None]
+        return [sum(part["tracks"] for part in parts), 0, 0, None, None, None, None]
     return [
-        f"{sum(one['tracks'] for one in parts):,}",
+        f"{sum(part['tracks'] for part in parts):,}",
         f"{seconds / 3600:,.2f}",
         f"{metres / 1000:,.1f}",
         f"{metres / seconds:.1f}",
@@ -278,13 +284,23 @@ def _describe_maps(facts: DatasetFacts) -> str:
     heads = ["map", "split", "runs", "seconds", "lanes with a light", *_OF_TRACKS]
     rows = [
         [
-            *(one.name, one.split, one.runs, f"{one.seconds:,.0f}", one.most.get("lights", 0)),
-            *_describe_tracks(list(one.categories.values())),
-            one.sha256,
+            *(
+                map_facts.name,
+                map_facts.split,
+                map_facts.runs,
+                f"{map_facts.seconds:,.0f}",
+                map_facts.most.get("lights", 0),
+            ),
+            *_describe_tracks(list(map_facts.categories.values())),
+            map_facts.sha256,
         ]
-        for one in facts.maps
+        for map_facts in facts.maps
     ]
-    shown = [f"![{_markdown_cell(one.name)}]({one.picture})\n" for one in facts.maps if one.picture]
+    shown = [
+        f"![{_markdown_cell(map_facts.name)}]({map_facts.picture})\n"
+        for map_facts in facts.maps
+        if map_facts.picture
+    ]
     return "\n".join([_markdown_table([*heads, "sha256 of the .xodr"], rows), *shown])
 
 

@@ -32,7 +32,7 @@ SplitName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
 TRAIN: Final = "train"
 
 
-def _one_split() -> dict[str, tuple[str, ...]]:
+def _make_one_split() -> dict[str, tuple[str, ...]]:
     return {TRAIN: ("*",)}
 
 
@@ -64,7 +64,7 @@ class DatasetPlan(Part):
     description: str = ""
     formats: Annotated[tuple[DatasetFormat, ...], Field(min_length=1)] = ("pyg",)
     compress: tuple[Compressible, ...] = ()
-    splits: dict[SplitName, tuple[Label, ...]] = Field(default_factory=_one_split)
+    splits: dict[SplitName, tuple[Label, ...]] = Field(default_factory=_make_one_split)
     keep_if: tuple[Label, ...] = ()
     usable: bool = True
     shard: Annotated[int, Field(ge=1, le=100_000)] = 100

@@ -187,8 +187,8 @@ def _write_tar(shard: Path, source: ShardSource, runs: Sequence[str]) -> None:
             for path in source.files(WEBDATASET, run):
                 content = path.read_bytes()
                 about = _write_map_beside(shard.parent, source, content, str(path))
-                said = {**about, "run": run, "figures": _keep_finite(source.rows.get(run, {}))}
-                text = json.dumps(said, ensure_ascii=False, allow_nan=False).encode()
+                row = {**about, "run": run, "figures": _keep_finite(source.rows.get(run, {}))}
+                text = json.dumps(row, ensure_ascii=False, allow_nan=False).encode()
                 for ending, data in (("json", text), ("npz", content)):
                     name = f"{keys[run]}.{ending}"
                     archive.addfile(member(name, len(data)), io.BytesIO(data))
@@ -196,14 +196,14 @@ def _write_tar(shard: Path, source: ShardSource, runs: Sequence[str]) -> None:
 
 def _sample_keys(runs: Sequence[str]) -> dict[str, str]:
     """Keys of samples: WebDataset takes what is before the first dot of a name, so none has one."""
-    found: dict[str, str] = {}
+    keys: dict[str, str] = {}
     for run in runs:
         key, number = run.replace(".", "_"), 1
-        while key in found.values():
+        while key in keys.values():
             number += 1
             key = f"{run.replace('.', '_')}-{number}"
-        found[run] = key
-    return found
+        keys[run] = key
+    return keys
 
 
 def _keep_finite(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -225,8 +225,8 @@ def _write_parquet(shard: Path, source: ShardSource, runs: Sequence[str]) -> Non
             about = about_of(arrays) or {}
             shared = source.map_of(about, arrays, str(path))
             _write_map_row(shard.parent, shared)
-            said = {**about, "run": run}
-            rows.append(_as_row({name: said[name] for name in _RUN_COLUMNS}, arrays))
+            row = {**about, "run": run}
+            rows.append(_make_row({name: row[name] for name in _RUN_COLUMNS}, arrays))
     with _new_file(shard.with_name(f"{shard.name}.parquet")) as part:
         pl.concat(rows).write_parquet(part, row_group_size=ROWS_IN_GROUP)
 
@@ -242,17 +242,17 @@ def _write_map_row(folder: Path, shared: SharedMap) -> None:
         return
     arrays = arrays_from_npz(shared.content, file=shared.file)
     about = about_of(arrays, "map_about") or {}
-    row = _as_row({name: about[name] for name in ("map", "map_sha256")}, arrays)
+    row = _make_row({name: about[name] for name in ("map", "map_sha256")}, arrays)
     with _new_file(file) as part:
         row.write_parquet(part)
 
 
-def _as_row(said: Mapping[str, Any], arrays: Mapping[str, Array]) -> pl.DataFrame:
+def _make_row(row_values: Mapping[str, Any], arrays: Mapping[str, Array]) -> pl.DataFrame:
     """One row: what is said, and each array as nested lists."""
     import polars as pl
 
     own = {name: values for name, values in arrays.items() if not name.endswith("about")}
-    columns = [pl.Series(name, [value]) for name, value in said.items()]
+    columns = [pl.Series(name, [value]) for name, value in row_values.items()]
     return pl.DataFrame([*columns, *(_nest_values(name, values) for name, values in own.items())])
 
 

@@ -209,8 +209,8 @@ def _finish_dataset(
     part.replace(out / TABLE_FILE)
     files = _list_dataset_files(out, plan)
     facts = DatasetFacts(plan, maps, versions(), table, left_out, files)
-    said: dict[str, Any] = facts.to_dict()
-    write_text(out / FACTS_FILE, json.dumps(said, indent=1, ensure_ascii=False) + "\n")
+    data: dict[str, Any] = facts.to_dict()
+    write_text(out / FACTS_FILE, json.dumps(data, indent=1, ensure_ascii=False) + "\n")
     write_text(out / CARD_FILE, card_text(facts))
     sums = {name: sha256 for name, (_, sha256) in facts.files.items()}
     sums |= {name: file_digest(out / name) for name in (PLAN_FILE, FACTS_FILE, CARD_FILE)}
@@ -229,13 +229,13 @@ def _collect_maps(
     for name, row in rows.items():
         source = grid.sources[row["scenario"]]
         runs[source.map_name, source.map_sha256].append(name)
-    found = []
+    facts = []
     for (name, sha256), own in sorted(runs.items()):
         files = [staged / STATISTICS / run / STATISTICS_FILE for run in own]
         whole = summed(json.loads(file.read_bytes()) for file in files if file.is_file())
         split = str(plan.split_of(name))
-        found.append(MapFacts(name, sha256, split, len(own), **whole))
-    return tuple(found)
+        facts.append(MapFacts(name, sha256, split, len(own), **whole))
+    return tuple(facts)
 
 
 def _read_maps(file: Path) -> tuple[MapFacts, ...]:
@@ -243,16 +243,16 @@ def _read_maps(file: Path) -> tuple[MapFacts, ...]:
     with documents("the facts of a dataset"):
         return tuple(
             MapFacts(
-                one["name"],
-                one["sha256"],
-                one["split"],
-                one.get("runs", 0),
-                one.get("seconds", 0.0),
-                one.get("most", {}),
-                one.get("road_users", {}),
-                one.get("picture"),
+                entry["name"],
+                entry["sha256"],
+                entry["split"],
+                entry.get("runs", 0),
+                entry.get("seconds", 0.0),
+                entry.get("most", {}),
+                entry.get("road_users", {}),
+                entry.get("picture"),
             )
-            for one in json.loads(file.read_bytes())["maps"]
+            for entry in json.loads(file.read_bytes())["maps"]
         )
 
 
@@ -261,14 +261,15 @@ def _draw_maps(out: Path, workspace: Workspace, maps: tuple[MapFacts, ...]) -> t
     shutil.rmtree(out / PICTURES_FOLDER, ignore_errors=True)  # what a kill has left of them
     drawn: set[str] = set()
     found = []
-    for one in maps:
+    for map_facts in maps:
         picture = None
-        if one.runs and one.split not in drawn:
-            drawn.add(one.split)
-            picture = f"{PICTURES_FOLDER}/{plain_name(one.name) or 'map'}-{one.sha256[:12]}.svg"
-            drawing = workspace.map_for(one.name, one.sha256).plot()
+        if map_facts.runs and map_facts.split not in drawn:
+            drawn.add(map_facts.split)
+            plain = plain_name(map_facts.name) or "map"
+            picture = f"{PICTURES_FOLDER}/{plain}-{map_facts.sha256[:12]}.svg"
+            drawing = workspace.map_for(map_facts.name, map_facts.sha256).plot()
             write_text(out / picture, drawing.svg)
-        found.append(replace(one, picture=picture))
+        found.append(replace(map_facts, picture=picture))
     return tuple(found)
 
 

@@ -221,7 +221,7 @@ _NAMED = 2
 
 def keep_map(baselines: Path, entry: MapEntry, digest: str) -> None:
     """Keep the OpenDRIVE text of a map, compressed; a map that is kept already is left alone."""
-    file = _kept_map_file(baselines, digest)
+    file = _path_of_kept_map(baselines, digest)
     if not file.is_file():
         write_file(file, gzip.compress(entry.read("xodr"), mtime=0))
 
@@ -230,7 +230,7 @@ def keep_scenario(baselines: Path, name: str, scenario: Scenario, made_of: Finge
     """Keep the scenario of a baseline, compressed, to say later which fields have changed."""
     kept = {"made_of": _scenario_parts(made_of), "scenario": json.loads(dumps(scenario))}
     text = json.dumps(kept, sort_keys=True, separators=(",", ":"))
-    write_file(_kept_scenario_file(baselines, name), gzip.compress(text.encode(), mtime=0))
+    write_file(_path_of_kept_scenario(baselines, name), gzip.compress(text.encode(), mtime=0))
 
 
 def scenario_changes_since(
@@ -248,7 +248,7 @@ def scenario_changes_since(
         The one of now.
     """
     try:
-        with gzip.open(_kept_scenario_file(baselines, name)) as stream:
+        with gzip.open(_path_of_kept_scenario(baselines, name)) as stream:
             kept = json.loads(stream.read(MOST))
         if kept["made_of"] != _scenario_parts(made_of):
             return ()
@@ -257,7 +257,7 @@ def scenario_changes_since(
         return ()
 
 
-def _kept_scenario_file(baselines: Path, name: str) -> Path:
+def _path_of_kept_scenario(baselines: Path, name: str) -> Path:
     return baselines / "scenarios" / f"{name}.json.gz"
 
 
@@ -265,7 +265,7 @@ def _scenario_parts(made_of: Fingerprint) -> Fingerprint:
     return {name: digest for name, digest in made_of.items() if name.startswith("scenario.")}
 
 
-def _as_run(run: CheckedRun) -> Scenario:
+def _scenario_as_run(run: CheckedRun) -> Scenario:
     """The scenario with what the suite says of its simulation."""
     until, step_length = run.settings.times(run.scenario)
     own = run.scenario.simulation.model_copy(update={"duration": until, "step_length": step_length})
@@ -284,7 +284,7 @@ def changes_since(baselines: Path, digest: str, entry: MapEntry) -> tuple[MapCha
     entry
         The map of now.
     """
-    before = _read_kept_map(_kept_map_file(baselines, digest), digest)
+    before = _read_kept_map(_path_of_kept_map(baselines, digest), digest)
     if before is None:
         return None
     return map_differences(before, parse(entry.read("xodr"), file=entry.path("xodr").name))
@@ -295,12 +295,12 @@ def change_words(changes: tuple[MapChange, ...]) -> str:
     if not changes:
         return "the map is written otherwise, but means the same"
     first = sorted(changes, key=lambda change: change.what not in LANE_CHANGES)
-    said = "; ".join(change.words for change in first[:_NAMED])
+    named = "; ".join(change.words for change in first[:_NAMED])
     more = len(changes) - _NAMED
-    return f"the map: {said}" + (f"; and {more} more" if more > 0 else "")
+    return f"the map: {named}" + (f"; and {more} more" if more > 0 else "")
 
 
-def _kept_map_file(baselines: Path, digest: str) -> Path:
+def _path_of_kept_map(baselines: Path, digest: str) -> Path:
     return baselines / FOLDER / f"{digest}.xodr.gz"
 
 
@@ -422,7 +422,9 @@ def _unusable_result(case: UnusableCase) -> CaseResult:
     if changes is None:
         return replace(result, causes=(cause,))
     notes = tuple(change.words for change in changes[:_MAP_CHANGES])
-    return replace(result, causes=(_in_words(cause, changes),), notes=notes, map_changes=changes)
+    return replace(
+        result, causes=(_put_in_words(cause, changes),), notes=notes, map_changes=changes
+    )
 
 
 def _judge_case(loaded: LoadedCase, update: Update) -> CaseResult:
@@ -449,7 +451,9 @@ def _judge_case(loaded: LoadedCase, update: Update) -> CaseResult:
     figures = {run.seed: run.figures for run in runs}
     result = replace(result, notes=seeds_that_hardly_vary(baseline_of(figures, {})))
     if update.wanted:
-        return _write_new_baseline(result, _as_run(loaded.run), figures, force=update.force)
+        return _write_new_baseline(
+            result, _scenario_as_run(loaded.run), figures, force=update.force
+        )
     if loaded.baseline is None:
         new = f"there is no baseline {case.baseline}; write it with --update-baseline"
         return replace(result, new=(new,))
@@ -488,11 +492,11 @@ def _hold_case(
     names = {cause.name for cause in causes}
     changes = _map_changes(case, result.entry, baseline) if "map" in names else None
     if changes is not None:
-        causes = tuple(_in_words(cause, changes) for cause in causes)
+        causes = tuple(_put_in_words(cause, changes) for cause in causes)
     fields: tuple[ScenarioChange, ...] = ()
     if case.baseline is not None and any(cause.part for cause in causes):
         fields = scenario_changes_since(
-            case.baseline.parent, case.name, baseline.fingerprint, _as_run(loaded.run)
+            case.baseline.parent, case.name, baseline.fingerprint, _scenario_as_run(loaded.run)
         )
         fields = tuple(_with_map_times(change, loaded.run) for change in fields)
         causes = tuple(_with_fields(cause, fields) for cause in causes)
@@ -513,7 +517,7 @@ def _hold_case(
         ),
         new=(
             *(_describe_missing_seeds(figures, own, "the baseline has no seed {}") if own else ()),
-            *_not_sized(case, baseline),
+            *_explain_sizing(case, baseline),
         ),
         notes=(
             *result.notes,
@@ -555,8 +559,8 @@ def _forbidden_changes(
     watched |= {"map"} & set(changed) if case.map_rule == "fail" else set()
     if case.map_rule == "lanes" and "map" not in watched:
         watched |= {f"{change.what} on the map" for change in on_map if change.what in LANE_CHANGES}
-    said = "this suite allows no change of"
-    return [f"{said} {', '.join(sorted(watched))}"] if watched else []
+    refusal = "this suite allows no change of"
+    return [f"{refusal} {', '.join(sorted(watched))}"] if watched else []
 
 
 def _map_changes(
@@ -569,7 +573,7 @@ def _map_changes(
     return changes_since(file.parent, digest, entry)
 
 
-def _in_words(cause: Cause, changes: tuple[MapChange, ...]) -> Cause:
+def _put_in_words(cause: Cause, changes: tuple[MapChange, ...]) -> Cause:
     return replace(cause, words=change_words(changes)) if cause.words == "the map" else cause
 
 
@@ -604,7 +608,7 @@ def _describe_missing_seeds(
     return (f"{words.format(listed)}; write it with --update-baseline",) if listed else ()
 
 
-def _not_sized(case: Case, baseline: Baseline) -> tuple[str, ...]:
+def _explain_sizing(case: Case, baseline: Baseline) -> tuple[str, ...]:
     """A suite that wants smaller changes to be caught than its baselines were made for."""
     detect = case.detect
     if detect is None or (baseline.sizing is not None and baseline.sizing.is_for(detect)):

@@ -214,7 +214,7 @@ def read_history(file: Path) -> tuple[HistoryLine, ...]:
     InputError
         If it cannot be read, or a line is none, with its number.
     """
-    found: dict[tuple[str, str], HistoryLine] = {}
+    lines: dict[tuple[str, str], HistoryLine] = {}
     for number, text in enumerate(read_given(file).decode("utf-8", "replace").splitlines(), 1):
         if not text.strip():
             continue
@@ -223,9 +223,9 @@ def read_history(file: Path) -> tuple[HistoryLine, ...]:
         except InputError as error:
             raise InputError(error.problem, file=str(file), element=f"line {number}") from error
         place = line.suite, line.commit
-        found.pop(place, None)
-        found[place] = line
-    return tuple(found.values())
+        lines.pop(place, None)
+        lines[place] = line
+    return tuple(lines.values())
 
 
 def _parse_line(text: str) -> HistoryLine:
@@ -306,18 +306,18 @@ def find_trends(history: Sequence[HistoryLine]) -> tuple[Trend, ...]:
     runs: dict[tuple[str, str], list[tuple[int, CaseLine]]] = {}
     for place, line in enumerate(history):
         for name, case in line.cases.items():
-            told = f"{line.suite}: {name}" if several else name
+            scenario_name = f"{line.suite}: {name}" if several else name
             for figure in case.figures:
-                runs.setdefault((told, figure), []).append((place, case))
-    found = []
+                runs.setdefault((scenario_name, figure), []).append((place, case))
+    trends = []
     for (scenario, figure), there in runs.items():
         values = [case.figures[figure] for _, case in there]
         places = [place for place, _ in there]
         levels = find_levels(values, places, figure_of("run", figure))
         seeds = {place: case.seeds for place, case in there}
         other = len(levels) > 1 and seeds[levels[-1].first] != seeds[levels[-2].last]
-        found.append(Trend(scenario, figure, tuple(places), tuple(values), tuple(levels), other))
-    return tuple(sorted(found, key=lambda x: (len(x.levels) < 2, -x.levels[-1].first, x.scenario)))
+        trends.append(Trend(scenario, figure, tuple(places), tuple(values), tuple(levels), other))
+    return tuple(sorted(trends, key=lambda x: (len(x.levels) < 2, -x.levels[-1].first, x.scenario)))
 
 
 # The page
@@ -375,8 +375,8 @@ def _changes_section(history: Sequence[HistoryLine], changed: Sequence[Trend]) -
 def _runs_section(history: Sequence[HistoryLine]) -> Markup:
     rows = []
     for line in reversed(history):
-        told = [case.status for case in line.cases.values()]
-        counts = ", ".join(f"{told.count(name)} {name}" for name in dict.fromkeys(told))
+        statuses = [case.status for case in line.cases.values()]
+        counts = ", ".join(f"{statuses.count(name)} {name}" for name in dict.fromkeys(statuses))
         cells = (line.short, line.date[:10], line.suite, counts)
         rows.append(element("tr", *(element("td", cell) for cell in cells)))
     return report_section(

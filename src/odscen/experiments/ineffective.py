@@ -41,14 +41,14 @@ def variables_without_effect(scenario: Scenario, plan: SweepPlan) -> dict[str, s
     A place of the document has no effect if it has none for every value that is tried: nine of a
     range, the first fifty rows of a table.
     """
-    found = {}
+    reasons = {}
     for axis in plan.axes:
         for column, name in enumerate(axis.names):
             if name in scenario.parameters:
                 reason = _find_reason(scenario, name, _values_of(axis, column))
                 if reason is not None:
-                    found[name] = reason
-    return found
+                    reasons[name] = reason
+    return reasons
 
 
 def _values_of(axis: Range | Table, column: int) -> list[float]:
@@ -101,7 +101,8 @@ def _make_cases(scenario: Scenario, name: str, values: list[float]) -> Iterator[
 def _is_constant(place: str, scenario: Scenario, cases: list[Scenario]) -> bool:
     text = scenario.formulas[place]
     results = {
-        evaluate(text, {key: one.value for key, one in case.parameters.items()}) for case in cases
+        evaluate(text, {key: parameter.value for key, parameter in case.parameters.items()})
+        for case in cases
     }
     return len(results) == 1
 
@@ -112,7 +113,7 @@ def _reason_of_place(scenario: Scenario, place: str) -> str | None:
     if kind == "environment":
         return _reason_of_weather(scenario, rest)
     if kind == "actors" and rest:
-        actor = next((one for one in scenario.actors if one.id == rest[0]), None)
+        actor = next((actor for actor in scenario.actors if actor.id == rest[0]), None)
         return None if actor is None else _reason_of_actor(scenario, actor, rest[1:], end)
     if kind == "rules" and rest:
         for rule in scenario.rules:

@@ -76,9 +76,9 @@ def _take_rows(rows: Rows, content: bytes, file: Path, *, sealed: bool) -> None:
     for number, line in enumerate(lines, start=1):
         try:
             if sealed:
-                own = _SUM.fullmatch(line, max(len(line) - 26, 0))
+                match = _SUM.fullmatch(line, max(len(line) - 26, 0))
                 text = line[: len(line) - 26] + b"}"
-                if own is None or own[1] != digest(text).encode()[:16]:
+                if match is None or match[1] != digest(text).encode()[:16]:
                     raise ValueError("it is not as it was written")
                 line = text  # noqa: PLW2901
             row = orjson.loads(line)

@@ -1,12 +1,13 @@
-"""Figures of a suite's own: a Python function of the finished run, named in the suite."""
+"""Figures of a suite's own: a function of the finished run, or its distance from a recording."""
 
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from odscen.app.figure_functions import value_of
 from odscen.base.errors import InputError
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
+    from odscen.maps.map_entry import MapEntry
     from odscen.runs.finished_run import Run
 
 
@@ -35,34 +37,84 @@ FigureName = Annotated[
 
 
 class FigureEntry(Part):
-    """``[figures.NAME]`` of a suite; ``function`` is ``FILE.py:NAME``, relative to the suite."""
+    """``[figures.NAME]`` of a suite; files are relative to the suite.
 
-    function: Annotated[str, Field(pattern=r"^[^:\x00]+\.py:[A-Za-z_][A-Za-z0-9_]*$")]
+    Attributes
+    ----------
+    function
+        ``FILE.py:NAME``, of the finished run; or instead of it
+    recording
+        recorded traffic, from which the run differs by so many bits in
+    of
+        a kind of figures (``kinematic``, ``interactive``, ``map``, ``all``) or one of them.
+    window, offset
+        Part of the recording, and how it lies on the map.
+    """
+
+    function: Annotated[str, Field(pattern=r"^[^:\x00]+\.py:[A-Za-z_][A-Za-z0-9_]*$")] | None = None
+    recording: Label | None = None
+    of: Label = "all"
+    window: Label | None = None
+    offset: Label | None = None
     unit: Annotated[str, Field(max_length=20)] = ""
     label: Label | None = None
     better: Better = Better.NEITHER
     tolerance: str = "2 %"
 
+    @model_validator(mode="after")
+    def _function_or_recording(self) -> Self:
+        if (self.function is None) == (self.recording is None):
+            raise ValueError("give a function or a recording, and not both")
+        if self.recording is not None:
+            from odscen.formats.tracks.realism import check_realism_name
+
+            try:
+                check_realism_name(self.of)
+            except InputError as error:
+                raise ValueError(error.problem) from error
+        return self
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RecordingFigure(Figure):
+    """How far a run is from recorded traffic; ``source`` is its file.
+
+    Attributes
+    ----------
+    of, window, offset
+        As in the suite.
+    """
+
+    of: str
+    window: str
+    offset: str
+
 
 def declared(data: Mapping[str, Any]) -> dict[str, Figure]:
     """Figures that the text of a suite declares, before it is validated, and columns of suites."""
     entries = data.get("figures")
-    found = {}
+    figures: dict[str, Figure] = {}
     for name, entry in entries.items() if isinstance(entries, dict) else ():
         given = entry if isinstance(entry, dict) else {}
-        found[name] = Figure(
-            name=name,
-            unit=str(given.get("unit", "")),
-            label=str(given.get("label") or name.replace("_", " ")),
-            definition="Defined by the suite.",
-            source=str(given.get("function", "")),
-            better=next(
+        values: dict[str, Any] = {
+            "name": name,
+            "unit": str(given.get("unit", "")),
+            "label": str(given.get("label") or name.replace("_", " ")),
+            "definition": "Defined by the suite.",
+            "source": str(given.get("function") or given.get("recording") or ""),
+            "better": next(
                 (better for better in Better if better == given.get("better")), Better.NEITHER
             ),
-            tolerance=str(given.get("tolerance", "2 %")),
-        )
+            "tolerance": str(given.get("tolerance", "2 %")),
+        }
+        if given.get("recording"):
+            for key, usual in (("of", "all"), ("window", ""), ("offset", "")):
+                values[key] = str(given.get(key) or usual)
+            figures[name] = RecordingFigure(**values)
+        else:
+            figures[name] = Figure(**values)
     more = {name: column.figure for name, column in COLUMNS.items() if SUITE in column.tables}
-    return found | more
+    return figures | more
 
 
 def refuse_tolerances(figures: Mapping[str, Figure]) -> None:
@@ -80,19 +132,36 @@ def refuse_tolerances(figures: Mapping[str, Figure]) -> None:
             raise InputError(error.problem, element=f"figures.{name}.tolerance") from error
 
 
-def own_values(figures: Mapping[str, Figure], run: Run, *, beside: Path) -> dict[str, float | None]:
-    """Compute the figures of a finished run; functions are in files relative to ``beside``.
+def own_values(
+    figures: Mapping[str, Figure], run: Run, *, beside: Path, entry: MapEntry | None = None
+) -> dict[str, float | None]:
+    """Compute the figures of a finished run on a map; files are relative to ``beside``.
 
     Raises
     ------
     InputError
-        If a function cannot be loaded, raises, or returns anything but a number or ``None``.
+        If a function cannot be loaded, raises, or returns anything but a number or ``None``; or
+        a recording cannot be read.
     """
+    from odscen.app.exchange.recorded_traffic import compare_with_recording, read_recorded_traffic
+    from odscen.formats.tracks.realism import divergence_of
+
     found: dict[str, float | None] = {}
+    compared: dict[tuple[str, ...], dict[str, Any]] = {}
     for name, figure in figures.items():
         if name in COLUMNS:
             value = COLUMNS[name].value(MeasuredRun(run))
             found[name] = None if value is None else float(value)
+            continue
+        if isinstance(figure, RecordingFigure):
+            recording = (figure.source, figure.window, figure.offset)
+            if recording not in compared:
+                read = read_recorded_traffic(
+                    beside / figure.source, window=figure.window, offset=figure.offset
+                )
+                driven = read_recorded_traffic(run.folder)
+                compared[recording] = compare_with_recording(driven, read, entry)
+            found[name] = divergence_of(compared[recording], figure.of)
             continue
         file, _, function = figure.source.rpartition(":")
 

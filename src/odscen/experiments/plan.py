@@ -179,12 +179,12 @@ class StudyPlan(Part):
             if self.samples is not None or self.method is not None:
                 raise InputError("method and samples are of vary, and nothing is varied")
             return None
-        said: dict[str, Any] = {"vary": list(self.vary), "seed": self.sample_seed}
+        data: dict[str, Any] = {"vary": list(self.vary), "seed": self.sample_seed}
         if self.samples is not None:
-            said["samples"] = self.samples
+            data["samples"] = self.samples
         if self.method is not None:
-            said["method"] = self.method
-        return plan_from_data(said)
+            data["method"] = self.method
+        return plan_from_data(data)
 
 
 def read_plan_data(file: Path) -> dict[str, Any]:
@@ -353,15 +353,20 @@ def found_sources(
     NotFoundError
         If the workspace does not have a map.
     """
-    found: dict[str, ScenarioSource] = {}
-    for source in (*_of_files(plan, workspace, beside), *_sampled_sources(plan, workspace)):
-        if source.name in found:
+    sources: dict[str, ScenarioSource] = {}
+    for source in (
+        *_read_scenario_files(plan, workspace, beside),
+        *_sampled_sources(plan, workspace),
+    ):
+        if source.name in sources:
             raise InputError(f"two scenarios of the study are called {source.name!r}")
-        found[source.name] = source
-    return found
+        sources[source.name] = source
+    return sources
 
 
-def _of_files(plan: StudyPlan, workspace: Workspace, beside: Path) -> Iterator[ScenarioSource]:
+def _read_scenario_files(
+    plan: StudyPlan, workspace: Workspace, beside: Path
+) -> Iterator[ScenarioSource]:
     for pattern in plan.scenarios:
         path = beside / pattern
         try:

@@ -209,8 +209,8 @@ def search(
     refuse_unknown(plan.names, scenario)
     proposer = proposal_kind(plan.method).start(plan)
     with disk_errors(f"search {out}"), locked(out, what=f"search {out.name!r}"):
-        said = _describe_search(plan, search_settings, settings)
-        begin_folder(out, {SEARCH_FILE: said}, scenario, what="search")
+        description = _describe_search(plan, search_settings, settings)
+        begin_folder(out, {SEARCH_FILE: description}, scenario, what="search")
         executor = LocalExecutor(workspace, processes, check)
         looking = _SearchState(workspace, scenario, plan, out, cases, executor, done)
         while (left := search_settings.runs - len(looking.rows)) > 0:

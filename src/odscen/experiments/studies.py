@@ -94,7 +94,7 @@ def write_study(folder: Path, grid: StudyGrid) -> None:
             row["sha256"] = digest(source.text.encode())
             write_text(folder / _SCENARIOS / f"{source.name}{SUFFIX}", source.text)
         rows.append(row)
-    said = {
+    data = {
         "format": FORMAT,
         "version": VERSION,
         "versions": versions(),
@@ -104,7 +104,7 @@ def write_study(folder: Path, grid: StudyGrid) -> None:
     }
     if not (folder / STUDY_FILE).is_file():
         write_sums(folder, {})  # of what follows; rows of its journal carry their own
-    write_text(folder / STUDY_FILE, seal(said, indent=1))
+    write_text(folder / STUDY_FILE, seal(data, indent=1))
 
 
 def _number_configs(grid: StudyGrid) -> dict[str, int]:

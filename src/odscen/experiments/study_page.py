@@ -59,10 +59,10 @@ class StudyGroup:
 
     def words(self, name: str) -> str:
         """``12.40 +- 0.31``, or a dash."""
-        one = self.figures[name]
-        if one.mean is None:
+        figure = self.figures[name]
+        if figure.mean is None:
             return "-"
-        return f"{one.mean:.2f} +- {one.half_width:.2f}"
+        return f"{figure.mean:.2f} +- {figure.half_width:.2f}"
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready."""
@@ -71,8 +71,8 @@ class StudyGroup:
             "variant": self.variant,
             "runs": self.runs,
             "figures": {
-                name: {"mean": one.mean, "half_width": one.half_width, "runs": one.seeds}
-                for name, one in self.figures.items()
+                name: {"mean": figure.mean, "half_width": figure.half_width, "runs": figure.seeds}
+                for name, figure in self.figures.items()
             },
         }
 

@@ -398,7 +398,7 @@ def _read_tolerances(
     table: ToleranceTable, *, own: Mapping[str, Figure]
 ) -> dict[tuple[str, str], Tolerance]:
     """Tolerances by kind of place and figure; ``segment.vehicles`` is in a table."""
-    found = {}
+    tolerances = {}
     for key, value in table.items():
         kind, rows = ("run", {key: value}) if isinstance(value, str) else (key, value)
         known = {figure.name: figure for figure in ALL_FIGURES if figure.kind == kind}
@@ -409,10 +409,10 @@ def _read_tolerances(
                 listed = ", ".join(sorted(known) or sorted(_PLACE_KINDS))
                 raise InputError(f"no figure has this name; known are {listed}", element=where)
             try:
-                found[kind, name] = parse_tolerance(str(text), known[name])
+                tolerances[kind, name] = parse_tolerance(str(text), known[name])
             except InputError as error:
                 raise InputError(error.problem, element=where) from error
-    return found
+    return tolerances
 
 
 class CaseStatus(StrEnum):

@@ -90,7 +90,7 @@ def _mean_known(values: Sequence[float | None]) -> float | None:
 
 def _place_styles(figures: Mapping[FigureKey, float | None]) -> PlaceStyles:
     """Segments by mean speed and junctions by stopped delay, where enough vehicles passed."""
-    found: PlaceStyles = {}
+    styles: PlaceStyles = {}
     for key, value in figures.items():
         passed = figures.get(key._replace(figure="vehicles")) or 0.0
         if value is None or passed < FEWEST:
@@ -98,11 +98,11 @@ def _place_styles(figures: Mapping[FigureKey, float | None]) -> PlaceStyles:
         words = f"{key.entry.label} {key.entry.written(value)}, {passed:g} vehicles"
         if (key.kind, key.figure) == ("segment", "mean_speed"):
             step = int(np.searchsorted(SPEED_STEPS_KMH, value * 3.6, side="right"))
-            found["segment", key.place] = (f"v{step}", words)
+            styles["segment", key.place] = (f"v{step}", words)
         elif (key.kind, key.figure) == ("junction", "waiting_time"):
             step = int(np.searchsorted(_DELAY_STEPS, value, side="right"))
-            found["junction", key.place] = (_LEVELS[step], words)
-    return found
+            styles["junction", key.place] = (_LEVELS[step], words)
+    return styles
 
 
 def _map_legend() -> Markup:
@@ -164,9 +164,9 @@ def suite_page(
         Folder of the page, for links to reports of runs that are kept.
     """
     idents = {case.name: f"case-{number}" for number, case in enumerate(result.cases, start=1)}
-    told = [case for case in result.worst_first if headline(case)]
+    with_headline = [case for case in result.worst_first if headline(case)]
     parts = [_render_head(result), _render_overview(result, idents), _render_touched(result)]
-    for number, case in enumerate(told):
+    for number, case in enumerate(with_headline):
         drawn = None
         if number < MOST_MAPS:
             with suppress(OdscenError):  # the map has gone meanwhile: the words are there

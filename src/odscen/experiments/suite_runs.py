@@ -329,7 +329,7 @@ def _seed_result(
         error = f"seed {seed}: the run failed: {words}"
         return SeedResult(seed, seconds, error, (), measure(result.folder, summary), folder)
     with in_file(str(suite.file)):
-        own = own_values(suite.figures, result, beside=suite.file.parent)
+        own = own_values(suite.figures, result, beside=suite.file.parent, entry=loaded.run.entry)
     summary = {**summary, "figures": {**summary["figures"], **own}}
     verdicts = evaluate(loaded.case.expectations, summary, read_judged(result.folder))
     failed = [row for row in verdicts if not row.passed]
@@ -430,7 +430,7 @@ def read_parts(paths: Iterable[Path]) -> dict[str, RunCase]:
     DamagedError
         If a file is not as it was written.
     """
-    found: dict[str, RunCase] = {}
+    run_cases: dict[str, RunCase] = {}
     for file in [file for path in paths for file in _results_files(path)]:
         with in_file(str(file)):
             read_document(
@@ -443,10 +443,10 @@ def read_parts(paths: Iterable[Path]) -> dict[str, RunCase]:
             with documents("results of a suite"):
                 cases = [_read_case(row, file) for row in data["scenarios"]]
             for case in cases:
-                if case.name in found:
-                    raise InputError(f"{case.name} is in {found[case.name].source} as well")
-                found[case.name] = case
-    return found
+                if case.name in run_cases:
+                    raise InputError(f"{case.name} is in {run_cases[case.name].source} as well")
+                run_cases[case.name] = case
+    return run_cases
 
 
 def _results_files(path: Path) -> list[Path]:

@@ -37,8 +37,8 @@ def headline(case: CaseResult) -> str:
     """
     if case.status in (CaseStatus.ERROR, CaseStatus.MISSING, CaseStatus.NEW):
         first = case.problems[0].splitlines()
-        said = first[0] if len(first) == 1 else f"{first[0]} {first[1].strip(' -')}"
-        return f"{case.causes[0].words}: {said}" if case.errors and case.causes else said
+        problem = first[0] if len(first) == 1 else f"{first[0]} {first[1].strip(' -')}"
+        return f"{case.causes[0].words}: {problem}" if case.errors and case.causes else problem
     if case.status is CaseStatus.FAILED and case.unusable:
         return f"usable: {case.unusable[0]}"
     if case.status is CaseStatus.FAILED:
@@ -128,8 +128,8 @@ def details(case: CaseResult) -> list[str]:
     found = [*case.problems, *_describe_better(case)]
     found += [text for text in (where(case), reason(case)) if text]
     found += [f"warning: {words}" for words in case.warnings]
-    told = (top, _describe_changed_inputs(case) if case.status.passes else top)
-    return list(dict.fromkeys(text for text in (*found, *case.notes) if text not in told))
+    parts = (top, _describe_changed_inputs(case) if case.status.passes else top)
+    return list(dict.fromkeys(text for text in (*found, *case.notes) if text not in parts))
 
 
 def lines(case: CaseResult) -> list[str]:
@@ -253,14 +253,16 @@ def suite_summary(result: SuiteResult) -> str:
             for words, names in result.touched.items()
         ]
         parts.append("Changed since the baselines:\n\n" + "\n".join(rows) + "\n")
-    told = [case for case in result.worst_first if case.status is not CaseStatus.PASSED]
-    if told:
+    not_passed = [case for case in result.worst_first if case.status is not CaseStatus.PASSED]
+    if not_passed:
         head = "| Scenario | Verdict | Why |\n| --- | --- | --- |\n"
         parts.append(
-            head + "\n".join(_summary_row(case) for case in told[:MOST_SUMMARY_ROWS]) + "\n"
+            head + "\n".join(_summary_row(case) for case in not_passed[:MOST_SUMMARY_ROWS]) + "\n"
         )
-    if len(told) > MOST_SUMMARY_ROWS:
-        parts.append(f"and {len(told) - MOST_SUMMARY_ROWS} more, see the page of the suite.\n")
+    if len(not_passed) > MOST_SUMMARY_ROWS:
+        parts.append(
+            f"and {len(not_passed) - MOST_SUMMARY_ROWS} more, see the page of the suite.\n"
+        )
     return "\n".join(parts)
 
 
@@ -308,8 +310,8 @@ def _add_scenario_case(suite: etree._Element, case: CaseResult, suite_name: str)
     properties = dict(_case_properties(case))
     element = _test_case(suite, case, suite_name, case.name, 0.0, properties)
     if case.status.passes:
-        if told := [text for text in (headline(case), *details(case)) if text]:
-            etree.SubElement(element, "system-out").text = _writable_text("\n".join(told))
+        if texts := [text for text in (headline(case), *details(case)) if text]:
+            etree.SubElement(element, "system-out").text = _writable_text("\n".join(texts))
         return
     tag = "error" if case.status is CaseStatus.ERROR else "failure"
     _add_outcome(element, tag, case.status.value, [headline(case), *details(case)])
@@ -385,10 +387,10 @@ def _test_case(
 
 
 def _add_outcome(element: etree._Element, tag: str, kind: str, words: Sequence[str]) -> None:
-    told = [_writable_text(text) for text in words]
+    texts = [_writable_text(text) for text in words]
     # An attribute holds no line breaks.
-    first = told[0].splitlines()[0] if told[0] else ""
-    etree.SubElement(element, tag, {"message": first, "type": kind}).text = "\n".join(told)
+    first = texts[0].splitlines()[0] if texts[0] else ""
+    etree.SubElement(element, tag, {"message": first, "type": kind}).text = "\n".join(texts)
 
 
 def _writable_text(text: str) -> str:

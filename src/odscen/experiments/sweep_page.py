@@ -223,8 +223,8 @@ def _draw_influence(sweep: SweepShown) -> Markup | None:
         if np.ptp(values) == 0:
             continue
         found = spearmanr(values, measure[known])
-        said = number(float(found.statistic), 2)
-        rows.append(element("tr", element("td", name), element("td", said, class_="n")))
+        correlation = number(float(found.statistic), 2)
+        rows.append(element("tr", element("td", name), element("td", correlation, class_="n")))
     if not rows:
         return None
     explained = (

@@ -99,12 +99,12 @@ class SweepSettings:
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready; columns of one's own by name."""
-        said = {
+        data = {
             "safe": list(self.safe),
             "figures": [*self.figures, *self.own],
             "seed": self.seed,
         }
-        return said if self.behaviour is None else said | {"behaviour": asdict(self.behaviour)}
+        return data if self.behaviour is None else data | {"behaviour": asdict(self.behaviour)}
 
 
 def settings_from_dict(data: Mapping[str, Any]) -> SweepSettings:
@@ -162,12 +162,12 @@ def begin_sweep(out: Path, scenario: Scenario, plan: SweepPlan, settings: SweepS
         If the folder holds another sweep.
     """
     head = {"format": FORMAT, "version": VERSION}
-    said = head | {"plan": plan.to_dict(), "settings": settings.to_dict()}
-    begin_folder(out, {SWEEP_FILE: said}, scenario, what="sweep")
+    description = head | {"plan": plan.to_dict(), "settings": settings.to_dict()}
+    begin_folder(out, {SWEEP_FILE: description}, scenario, what="sweep")
 
 
 def begin_folder(
-    out: Path, said: Mapping[str, Mapping[str, Any]], scenario: Scenario, *, what: str
+    out: Path, description: Mapping[str, Mapping[str, Any]], scenario: Scenario, *, what: str
 ) -> None:
     """Write what the folder of a sweep or a search is about, by file, and its scenario.
 
@@ -177,7 +177,8 @@ def begin_folder(
         If the folder holds another one.
     """
     files = {
-        name: json.dumps(data, indent=2, ensure_ascii=False) + "\n" for name, data in said.items()
+        name: json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+        for name, data in description.items()
     }
     files[SCENARIO_FILE] = dumps(scenario)
     there = {name: out / name for name in files if (out / name).is_file()}
@@ -309,7 +310,7 @@ class CaseRuns:
                 row["status"] = str(run.status)
                 if run.status is RunStatus.COMPLETED:
                     measured = MeasuredRun(run, self._watched)
-                    measures = {key: one.value(measured) for key, one in self.columns.items()}
+                    measures = {key: column.value(measured) for key, column in self.columns.items()}
                     known = {"planned": run.counts.get("planned"), **measures}
                     row["safe"] = not measures["collision"] and all(
                         limit.holds(known) for limit in self.limits
@@ -348,7 +349,7 @@ def write_cases(
     limits: Sequence[Limit],
 ) -> pl.DataFrame:
     """Write the table and the page of cases; ``names`` are the parameters that are varied."""
-    table = _as_table(rows)
+    table = _make_table(rows)
     unseal_files(out, (TABLE_FILE, PAGE_FILE))
     part = out / f".{TABLE_FILE}.part"
     table.write_parquet(part)
@@ -375,14 +376,14 @@ def read_table(out: Path) -> Sweep:
     """
     import polars as pl
 
-    scenario, plan, said = read_sweep(out)
+    scenario, plan, description = read_sweep(out)
     if (out / TABLE_FILE).is_file():
         check_files(out, only=(TABLE_FILE,))
         with tables(str(out / TABLE_FILE)):
             table = pl.read_parquet(out / TABLE_FILE)
     else:
-        runs = CaseRuns(scenario, out, settings_from_dict(said))
-        table = _as_table(runs.rows(named_cases(plan)))
+        runs = CaseRuns(scenario, out, settings_from_dict(description))
+        table = _make_table(runs.rows(named_cases(plan)))
     return Sweep(out, table, _find_boundary(plan, table.to_dicts()))
 
 
@@ -393,7 +394,7 @@ def named_cases(plan: SweepPlan) -> dict[str, dict[str, float]]:
     return {f"case-{number:0{digits}}": values for number, values in enumerate(cases, start=1)}
 
 
-def _as_table(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
+def _make_table(rows: Sequence[Mapping[str, Any]]) -> pl.DataFrame:
     import polars as pl
 
     texts, flags = {"case", "status", "detail"}, {"safe", "collision"}
@@ -563,17 +564,19 @@ def opened_case(out: Path, case: str) -> Scenario:
     file = out / "cases" / f"{case}{SUFFIX}"
     if not _CASE.fullmatch(case) or not file.is_file():
         raise NotFoundError(f"case of sweep {out.name!r}", case, [])
-    whole, _, said = read_sweep(out)
+    whole, _, description = read_sweep(out)
     check_files(out, only=(f"cases/{file.name}",))
     found = read_scenario(file)
-    limits = [limit for text in said["safe"] if (limit := _of_ttc(text)) is not None]
+    limits = [
+        limit for text in description["safe"] if (limit := _parse_ttc_limit(text)) is not None
+    ]
     criteria = list(found.criteria)
     if any(actor.ego for actor in found.actors):
         own = ["collided(ego) == 0", *(_describe_criterion(limit) for limit in limits)]
         criteria += [text for text in own if text not in criteria]
     changes = {
         "name": f"{whole.name[:100]}, {case}",
-        "seed": found.seed if said["seed"] is None else said["seed"],
+        "seed": found.seed if description["seed"] is None else description["seed"],
         "criteria": tuple(criteria),
     }
     return found.model_copy(update=changes)
@@ -583,7 +586,7 @@ def _describe_criterion(limit: Limit) -> str:
     return f"{_TTC}(ego) {limit.expectation.op} {limit.expectation.bound:g} s"
 
 
-def _of_ttc(text: str) -> Limit | None:
+def _parse_ttc_limit(text: str) -> Limit | None:
     """A limit if it is one of time to collision that a criterion can hold as well."""
     if re.match(rf"\s*{_TTC}\s*>", text) is None:
         return None

@@ -345,10 +345,10 @@ def study_table(grid: StudyGrid, rows: Mapping[str, Mapping[str, Any]]) -> pl.Da
         "map": [grid.sources[run.scenario].map_name for run in ended],
         **{name: _values_of_runs(grid, ended, name) for name in grid.parameters},
     }
-    said = [rows[run.name] for run in ended]
+    ended_rows = [rows[run.name] for run in ended]
     for name in schema:
         if name not in columns:
-            columns[name] = [row.get(name) for row in said]
+            columns[name] = [row.get(name) for row in ended_rows]
     return pl.DataFrame(columns, schema=schema)
 
 

@@ -127,7 +127,7 @@ def allowed_by_chance(
     float or None
         ``None`` where fewer than :data:`FEWEST_SEEDS` of a side have the figure.
     """
-    one, other = _known_values(old), _known_values(new)
+    one, other = _drop_missing_values(old), _drop_missing_values(new)
     if min(len(one), len(other)) < FEWEST_SEEDS:
         return None
     tail = tail_of(level, both_sides=both_sides)
@@ -179,7 +179,7 @@ def _detectable_change(share: float, count: int, level: float) -> float:
     return needed * share * math.sqrt(2 / count)
 
 
-def _known_values(values: Mapping[int, float | None]) -> dict[int, float]:
+def _drop_missing_values(values: Mapping[int, float | None]) -> dict[int, float]:
     return {seed: value for seed, value in values.items() if value is not None}
 
 

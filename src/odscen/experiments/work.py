@@ -163,10 +163,10 @@ def carry_out_order(
         If this is not the version of odscen or SUMO that the order is for.
     """
     refuse_other_versions(order.versions)
-    return [_carried_out(order, *each, workspaces, stopped) for each in order.runs]
+    return [_carry_out_order(order, *each, workspaces, stopped) for each in order.runs]
 
 
-def _carried_out(
+def _carry_out_order(
     order: WorkOrder,
     run: StudyRun,
     values: Mapping[str, float],

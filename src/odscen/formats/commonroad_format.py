@@ -91,20 +91,24 @@ def write_commonroad_files(source: ExportSource) -> ExportFiles:
             "<scenarioTags><simulated/></scenarioTags>",
             *_write_lanelets(recording, ids, limits, lights, bounds),
             *(
-                _write_crosswalk(one, ids.crosswalks + k)
-                for k, one in enumerate(elements.crosswalks)
+                _write_crosswalk(crosswalk, ids.crosswalks + k)
+                for k, crosswalk in enumerate(elements.crosswalks)
             ),
             *(_write_sign(limit, ids.signs + k) for k, limit in enumerate(limits)),
-            *(_write_light(one, recording.signals, ids.lights + k) for k, one in enumerate(lights)),
+            *(
+                _write_light(light, recording.signals, ids.lights + k)
+                for k, light in enumerate(lights)
+            ),
             *_write_obstacles(recording, stretches, ids),
             _planning_problem(recording, ids.problem),
             "</commonRoad>\n",
         ]
     )
-    said = _describe_export(recording, stretches, ids, len(lights))
+    description = _describe_export(recording, stretches, ids, len(lights))
     return {
         f"{recording.name}.xml": text,
-        f"{recording.name}.export.json": json.dumps(said, indent=2, ensure_ascii=False) + "\n",
+        f"{recording.name}.export.json": json.dumps(description, indent=2, ensure_ascii=False)
+        + "\n",
     }
 
 
@@ -145,11 +149,11 @@ def _describe_export(
         "obstacles": [
             {
                 "id": ids.obstacles + k,
-                "road_user": tracks.ids[one.row],
-                "first_step": one.first,
-                "last_step": one.last,
+                "road_user": tracks.ids[stretch.row],
+                "first_step": stretch.first,
+                "last_step": stretch.last,
             }
-            for k, one in enumerate(stretches)
+            for k, stretch in enumerate(stretches)
         ],
     }
 
@@ -301,23 +305,23 @@ def _write_obstacles(
     borders = [lane.left for lane in recording.elements.lanes]
     left = min(float(line[:, 0].min()) for line in borders) - _WAITING[0]
     below = min(float(line[:, 1].min()) for line in borders)
-    for k, one in enumerate(stretches):
-        category = tracks.categories[one.row]
-        if one.first == 0:
-            begins = _write_state("initialState", tracks, one.row, 0)
+    for k, stretch in enumerate(stretches):
+        category = tracks.categories[stretch.row]
+        if stretch.first == 0:
+            begins = _write_state("initialState", tracks, stretch.row, 0)
         else:
             begins = _write_pose("initialState", left, below + k * _WAITING[1], 0.0, 0, 0.0)
         # A trajectory has a state at least, and none of them is at instant 0.
-        later = range(max(one.first, 1), one.last + 1)
-        states = [_write_state("state", tracks, one.row, instant) for instant in later]
+        later = range(max(stretch.first, 1), stretch.last + 1)
+        states = [_write_state("state", tracks, stretch.row, instant) for instant in later]
         if not states:
-            states = [_write_state("state", tracks, one.row, 0, at=1)]
+            states = [_write_state("state", tracks, stretch.row, 0, at=1)]
         yield "".join(
             [
                 f'<dynamicObstacle id="{ids.obstacles + k}">',
                 f"<type>{_TYPES.get(category, category)}</type>",
-                f"<shape><rectangle><length>{tracks.length[one.row]:.4f}</length>",
-                f"<width>{tracks.width[one.row]:.4f}</width></rectangle></shape>",
+                f"<shape><rectangle><length>{tracks.length[stretch.row]:.4f}</length>",
+                f"<width>{tracks.width[stretch.row]:.4f}</width></rectangle></shape>",
                 begins,
                 f"<trajectory>{''.join(states)}</trajectory></dynamicObstacle>",
             ]

@@ -90,7 +90,7 @@ def read_feed(tables: Mapping[str, str], *, day: date | None = None) -> Feed:
             route = routes.get(row["route_id"])
             if route is None:
                 raise row.refusal("route_id", "is not in routes.txt")
-            if _by_bus(route):
+            if _is_bus_route(route):
                 trips[row["trip_id"]] = _route_name(route)
             else:
                 other += 1
@@ -176,7 +176,7 @@ def _services_on_day(tables: Mapping[str, str], day: date | None) -> set[str] | 
     return running
 
 
-def _by_bus(route: _FeedRow) -> bool:
+def _is_bus_route(route: _FeedRow) -> bool:
     """Whether a route is one of buses or trolleybuses, extended types included."""
     kind = int(route.number("route_type"))
     return kind in (3, 11) or 700 <= kind < 717 or kind == 800

@@ -93,7 +93,7 @@ def place_feed(
     left_out["stops away from the region"] = len(known) - len(nodes)
     groups: dict[tuple[str, tuple[str, ...], tuple[float, ...]], list[float]] = {}
     for trip in trips:
-        run = _on_map(trip, nodes)
+        run = _keep_stops_on_map(trip, nodes)
         if not run.stops:
             continue
         first = run.times[0]
@@ -155,7 +155,7 @@ def _find_stop_nodes(
     return found
 
 
-def _on_map(trip: FeedTrip, nodes: dict[str, int]) -> _Run:
+def _keep_stops_on_map(trip: FeedTrip, nodes: dict[str, int]) -> _Run:
     """Stops of a trip that are on the map and have a time."""
     kept = [
         (visit.stop, visit.departure)

@@ -68,9 +68,13 @@ def _write_scenario(source: ExportSource, dialect: Dialect) -> ExportFiles:
     notes = ExportNotes()
     scenario, places = source.scenario, Places(source)
     _note_traffic(source, dialect, notes)
-    said = scenario.environment.model_dump(exclude_defaults=True) or scenario.demand.clock
+    has_environment = (
+        scenario.environment.model_dump(exclude_defaults=True) or scenario.demand.clock
+    )
     # ScenarioRunner asks each file for its weather.
-    sky = _write_weather(source, dialect) if said or dialect.for_scenario_runner else None
+    sky = (
+        _write_weather(source, dialect) if has_environment or dialect.for_scenario_runner else None
+    )
     story = Story(scenario, places, dialect, notes, sky)
     entities = [entity(actor, places, dialect) for actor in scenario.actors]
     signals = traffic_signals(source, notes)
@@ -141,8 +145,8 @@ def _make_files(
 
 def _make_title(scenario: Scenario, dialect: Dialect) -> str:
     """Description of the file; ScenarioRunner takes it as a name."""
-    said = "" if dialect.for_scenario_runner else scenario.description
-    return (said or scenario.name).removeprefix(LEFT_HANDED)
+    description = "" if dialect.for_scenario_runner else scenario.description
+    return (description or scenario.name).removeprefix(LEFT_HANDED)
 
 
 def _weather_parameters(source: ExportSource) -> dict[str, float]:

@@ -114,7 +114,7 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
         )
         frames.append((time, content))
     version = ".".join(map(str, VERSION))
-    said = {
+    data = {
         "format": "osi",
         "osi_version": version,
         "run": source.name,
@@ -140,7 +140,7 @@ def write_osi_trace(source: ExportSource) -> ExportFiles:
         trace = b"".join(struct.pack("<I", len(content)) + content for _, content in frames)
     return {
         f"{source.name}.{container}": trace,
-        f"{source.name}.export.json": json.dumps(said, indent=2, ensure_ascii=False) + "\n",
+        f"{source.name}.export.json": json.dumps(data, indent=2, ensure_ascii=False) + "\n",
         _map_name(source): source.map_file,
     }
 
@@ -244,8 +244,10 @@ def _encode_lights(
                 )
                 mode = _LIT if color == bulb + 1 else _DARK
                 classification = whole(1, kind) + whole(2, _NO_ICON) + whole(3, mode)
-                one = _encode_identifier(1, _FIRST_BULB + 3 * row + bulb) + message(2, base)
-                content += message(7, one + message(3, classification))
+                bulb_message = _encode_identifier(1, _FIRST_BULB + 3 * row + bulb) + message(
+                    2, base
+                )
+                content += message(7, bulb_message + message(3, classification))
             shown.append(content)
         found.append((shown[0], shown[1], shown[2], shown[3]))
     return found

@@ -48,13 +48,13 @@ _SHORT: Final = {
     "n": "net-file", "net": "net-file", "r": "route-files", "routes": "route-files",
     "a": "additional-files", "additional": "additional-files", "b": "begin", "e": "end",
 }  # fmt: skip
-_OWN: Final = frozenset((
+_OWN_OPTIONS: Final = frozenset((
     "net-file", "route-files", "additional-files", "begin", "end", "step-length", "seed",
     "time-to-teleport", "lateral-resolution", "default.action-step-length", "pedestrian.model",
 ))  # fmt: skip
 """Options that the scenario has as parts of its own."""
 _TIMES: Final = ("begin", "end", "step-length", "time-to-teleport", "lateral-resolution")
-_OTHERWISE: Final = (
+_UNSUPPORTED: Final = (
     (
         re.compile("mesosim"), "approximated",
         "each vehicle moves by SUMO's microscopic model, so times and queues are others than those "
@@ -114,10 +114,10 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     if root.tag not in _ROOTS:
         raise InputError(
             f"this is no SUMO configuration: its root element is <{str(root.tag)[:40]}>"
-            f"{_words_for(str(root.tag))}",
+            f"{_explain_root(str(root.tag))}",
             file=source.file.where,
         )
-    options = _options_of(root)
+    options = _read_options(root)
     _check_numbers(options, source.file.where)
     net_name = options.get("net-file")
     if not net_name:
@@ -134,7 +134,7 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     scenario = _empty_scenario(source, on_map, max(0, min(seed, 2**31 - 1)), report)
     project = SumoProject(
         begin=begin,
-        options=allowed_options({n: v for n, v in options.items() if n not in _OWN}),
+        options=allowed_options({n: v for n, v in options.items() if n not in _OWN_OPTIONS}),
         files=tuple(_pack_file(file) for file in files if len(file.root)),
     )
     scenario = scenario.model_copy(
@@ -146,8 +146,8 @@ def read_sumo_project(source: ImportSource) -> FileContent:
     if begin:
         study = scenario.study.model_copy(update={"warm_up": float(np.ceil(begin))})
         scenario = scenario.model_copy(update={"study": study})
-    scenario = _with_zones(scenario, on_map.sumo_map, files, report)
-    scenario = _with_detectors(scenario, on_map.sumo_map, files, report)
+    scenario = _add_zones(scenario, on_map.sumo_map, files, report)
+    scenario = _add_detectors(scenario, on_map.sumo_map, files, report)
     _report_files(files, report)
     _report_options(options, report)
     return FileContent(scenario, lists=report.lists)
@@ -157,7 +157,7 @@ def _unpack_content(content: bytes) -> bytes:
     return unpack_gzip(content, most=MOST) if content.startswith(GZIP) else content
 
 
-def _words_for(root: str) -> str:
+def _explain_root(root: str) -> str:
     if root in ("routes", "additional", "add"):
         return "; open the .sumocfg that names this file"
     if root.endswith("onfiguration"):
@@ -165,17 +165,17 @@ def _words_for(root: str) -> str:
     return ""
 
 
-def _options_of(root: etree._Element) -> dict[str, str]:
+def _read_options(root: etree._Element) -> dict[str, str]:
     """All options with values, by their long names, whatever section they are in."""
-    found: dict[str, str] = {}
+    options: dict[str, str] = {}
     for element in root.iter():
         if isinstance(element.tag, str) and element is not root:
             value = element.get("value", element.get("v"))
             if value is None and not len(element) and not element.attrib:
                 value = (element.text or "").strip() or None  # <end>3600</end> is taken, too
             if value is not None:
-                found[_SHORT.get(element.tag, element.tag)] = value.strip()
-    return found
+                options[_SHORT.get(element.tag, element.tag)] = value.strip()
+    return options
 
 
 def _check_numbers(options: Mapping[str, str], file: str) -> None:
@@ -248,9 +248,9 @@ def _take_programs(files: list[_ReadFile], report: ElementReport) -> list[etree.
     Those with detectors or conditions of their own stay where they are, as SUMO knows of these only
     when it reads the file.
     """
-    found: list[etree._Element] = []
+    programs: list[etree._Element] = []
     for index, file in enumerate(files):
-        taken = [
+        logics = [
             logic
             for logic in file.root.iterchildren("tlLogic")
             if logic.get("type", "static") == "static"
@@ -260,9 +260,9 @@ def _take_programs(files: list[_ReadFile], report: ElementReport) -> list[etree.
                 and logic.find("condition") is None
             )
         ]
-        if not taken:
+        if not logics:
             continue
-        for logic in taken:
+        for logic in logics:
             label = f"tlLogic {logic.get('id')}, program {logic.get('programID')}"
             phases = len(logic.findall("phase"))
             cycle = sum(float(p.get("duration") or 0) for p in logic.iterchildren("phase"))
@@ -273,10 +273,10 @@ def _take_programs(files: list[_ReadFile], report: ElementReport) -> list[etree.
                 line=_line_of(logic),
             )
             file.root.remove(logic)
-            found.append(logic)
+            programs.append(logic)
         text = etree.tostring(file.root, encoding="unicode") + "\n"
         files[index] = file._replace(text=text)
-    return found
+    return programs
 
 
 def _line_of(element: etree._Element) -> int:
@@ -294,7 +294,7 @@ def _bring_network(
     """The map of a network with programs put in."""
     with in_file(file.where):
         if programs:
-            content, strangers = _with_programs(content, programs)
+            content, strangers = _insert_programs(content, programs)
             for name in strangers:
                 report.add("ignored", f"tlLogic {name}", "the network has no such light")
         if source.bring_network is None:
@@ -310,7 +310,7 @@ def _bring_network(
     return on_map
 
 
-def _with_programs(content: bytes, programs: Sequence[etree._Element]) -> tuple[bytes, list[str]]:
+def _insert_programs(content: bytes, programs: Sequence[etree._Element]) -> tuple[bytes, list[str]]:
     """A network with further programs, and lights that it does not have."""
     root = read_xml(content, huge=True)
     known = {logic.get("id") for logic in root.iterchildren("tlLogic")}
@@ -407,6 +407,7 @@ def _last_departure(files: Sequence[_ReadFile]) -> float:
         for element in file.root.iterchildren("vehicle", "trip", "person", "flow", "personFlow"):
             for name in ("depart", "end"):
                 last = max(last, seconds_of(element.get(name)) or 0.0)
+            # A flow without an end lasts for as many departures as it has.
             number, period = (seconds_of(element.get(n)) for n in ("number", "period"))
             if number and period and element.get("end") is None:
                 last = max(last, (seconds_of(element.get("begin")) or 0.0) + number * period)
@@ -418,11 +419,11 @@ def _pack_file(file: _ReadFile) -> SumoFile:
     return SumoFile.of(file.name, file.kind, file.text, dict(sorted(counts.items())))
 
 
-def _part_id(name: str | None) -> str:
+def _clean_part_id(name: str | None) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]+", "-", name or "").strip("-._")[:64]
 
 
-def _with_zones(
+def _add_zones(
     scenario: Scenario, sumo_map: SumoMap, files: Sequence[_ReadFile], report: ElementReport
 ) -> Scenario:
     graph, roi = sumo_map.graph, frozenset(scenario.roi)
@@ -438,7 +439,7 @@ def _with_zones(
                 if pair is not None
                 for node in pair
             )
-            name = _part_id(taz.get("id"))
+            name = _clean_part_id(taz.get("id"))
             inside = tuple(segment for segment in segments if segment in roi)
             if inside and name:
                 parts[name] = {"segments": inside}
@@ -446,15 +447,15 @@ def _with_zones(
     return put_parts(scenario, graph, "zones", parts) if parts else scenario
 
 
-def _with_detectors(
+def _add_detectors(
     scenario: Scenario, sumo_map: SumoMap, files: Sequence[_ReadFile], report: ElementReport
 ) -> Scenario:
     places = sumo_map.lane_places
     row_of = {lane: row for row, lane in enumerate(places.lanes)}
-    found: dict[str, dict[str, Any]] = {}
+    detectors: dict[str, dict[str, Any]] = {}
     for file in files:
         for loop in file.root.iter("inductionLoop", "e1Detector"):
-            name, lane = _part_id(loop.get("id")), loop.get("lane", "")
+            name, lane = _clean_part_id(loop.get("id")), loop.get("lane", "")
             pos = seconds_of(loop.get("pos")) or 0.0
             nodes = np.flatnonzero(places.lane == row_of.get(lane, -2))
             if not name or not len(nodes):
@@ -468,12 +469,12 @@ def _with_detectors(
             if pos < 0:
                 pos += sumo_map.net.lanes[lane].length
             node = int(nodes[int(np.argmin(np.abs(places.pos[nodes] - pos)))])
-            found[name] = {"id": name, "nodes": (str(node_id(sumo_map.graph, node)),)}
+            detectors[name] = {"id": name, "nodes": (str(node_id(sumo_map.graph, node)),)}
             reason = f"detector {name} of the study"
             report.add("taken", f"{loop.tag} {loop.get('id')}", reason, line=_line_of(loop))
-    if not found:
+    if not detectors:
         return scenario
-    return edits.set_study(scenario, sumo_map.graph, detectors=list(found.values()))
+    return edits.set_study(scenario, sumo_map.graph, detectors=list(detectors.values()))
 
 
 def _report_files(files: Sequence[_ReadFile], report: ElementReport) -> None:
@@ -485,9 +486,9 @@ def _report_files(files: Sequence[_ReadFile], report: ElementReport) -> None:
 
 def _report_options(options: Mapping[str, str], report: ElementReport) -> None:
     for name, value in sorted(options.items()):
-        if name in _OWN:
+        if name in _OWN_OPTIONS:
             continue
-        own = ((become, why) for pattern, become, why in _OTHERWISE if pattern.fullmatch(name))
+        own = ((become, why) for pattern, become, why in _UNSUPPORTED if pattern.fullmatch(name))
         become, why = next(own, ("", ""))
         if OPTIONS.fullmatch(name):
             report.add("taken", f"option {name}", f"{value}, handed on to SUMO")

@@ -71,10 +71,10 @@ def _choose_tracks(files: Sequence[GivenFile]) -> int:
 FORMAT = Format(
     id="trajectories",
     title="Recorded traffic (CSV, Parquet, OSI)",
-    label="tracks of INTERACTION, SinD, levelX, NGSIM, Argoverse 2, CommonRoad, OSI and "
-    "omega-prime, or a table of time, x, y and more",
+    label="tracks of INTERACTION, SinD, levelX, NGSIM, Argoverse 2, ScenarioNet, CommonRoad, OSI "
+    "and omega-prime, or a table of time, x, y and more",
     of=("scenario", "run"),
-    suffixes=(".csv", ".parquet", ".osi", ".mcap"),
+    suffixes=(".csv", ".parquet", ".osi", ".mcap", ".pkl"),
     read=read_tracks,
     choose_main=_choose_tracks,
     options=(

@@ -62,7 +62,7 @@ def write_waymo_scenarios(source: ExportSource) -> ExportFiles:
         listed.append(
             {"scenario_id": name, "begin": float(recording.times[first]), "tracks": len(tracks.ids)}
         )
-    said = {
+    data = {
         "format": "waymo",
         "run": recording.name,
         "map": recording.map_name,
@@ -75,7 +75,7 @@ def write_waymo_scenarios(source: ExportSource) -> ExportFiles:
     }
     return {
         f"{recording.name}.tfrecord": tfrecord(records),
-        f"{recording.name}.export.json": json.dumps(said, indent=2, ensure_ascii=False) + "\n",
+        f"{recording.name}.export.json": json.dumps(data, indent=2, ensure_ascii=False) + "\n",
     }
 
 
@@ -103,15 +103,18 @@ def _encode_scenario(
         [
             *(double(1, time) for time in times),
             *(
-                message(2, _encode_track(tracks, row, velocity[row], number[one]))
-                for row, one in enumerate(tracks.ids)
+                message(2, _encode_track(tracks, row, velocity[row], number[user]))
+                for row, user in enumerate(tracks.ids)
             ),
             text(5, name),
             whole(6, leading),
             *(message(7, light_state) for light_state in _light_states(recording, first)),
             features,
             whole(10, PRESENT),
-            *(message(11, whole(1, row) + whole(2, 1)) for row in _to_predict(tracks, leading)),
+            *(
+                message(11, whole(1, row) + whole(2, 1))
+                for row in _choose_to_predict(tracks, leading)
+            ),
         ]
     )
 
@@ -143,7 +146,7 @@ def _encode_track(tracks: Tracks, row: int, velocity: FloatArray, number: int) -
     return whole(1, number) + whole(2, kind) + packed_messages(3, columns, flags={11: valid})
 
 
-def _to_predict(tracks: Tracks, leading: int) -> list[int]:
+def _choose_to_predict(tracks: Tracks, leading: int) -> list[int]:
     """Those who move most of the road users that are there now, without the leading one."""
     import numpy as np
 

@@ -75,11 +75,11 @@ def connect(
         [number[after] for after in successors.get(key, ()) if after in number] for key in keys
     ]
     parts = [
-        _along_lanes(nodes),
-        _across_joints(nodes, follow),
-        _at_sides(nodes, number, sides),
-        _to_the_side(nodes, follow, Relation.LEFT),
-        _to_the_side(nodes, follow, Relation.RIGHT),
+        _link_along_lanes(nodes),
+        _link_across_joints(nodes, follow),
+        _link_at_sides(nodes, number, sides),
+        _link_lane_changes(nodes, follow, Relation.LEFT),
+        _link_lane_changes(nodes, follow, Relation.RIGHT),
     ]
     source, target, relation, length = (
         np.concatenate(columns) for columns in zip(*parts, strict=True)
@@ -95,14 +95,14 @@ def connect(
     return Edges(source[keep], target[keep], relation[keep], length[keep])
 
 
-def _along_lanes(nodes: NodeTable) -> Edges:
+def _link_along_lanes(nodes: NodeTable) -> Edges:
     """From each node to the next one of its lane."""
     source = np.flatnonzero(nodes.lane[:-1] == nodes.lane[1:])
     length = nodes.offset[source + 1] - nodes.offset[source]
     return _make_edges(source, source + 1, Relation.SUCCESSOR, length)
 
 
-def _across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
+def _link_across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
     """From the last node of each lane to the first of each lane that follows it."""
     lengths = nodes.lines.lengths.tolist()
     first = nodes.first.tolist()
@@ -121,7 +121,9 @@ def _across_joints(nodes: NodeTable, follow: list[list[int]]) -> Edges:
     return _make_edges(source, target, Relation.SUCCESSOR, length)
 
 
-def _at_sides(nodes: NodeTable, number: Mapping[LaneKey, int], sides: Sequence[SideLink]) -> Edges:
+def _link_at_sides(
+    nodes: NodeTable, number: Mapping[LaneKey, int], sides: Sequence[SideLink]
+) -> Edges:
     """Between the last node before a side link and the first one behind it."""
     pairs: list[tuple[int, int, float]] = []
     for side in sides:
@@ -163,7 +165,7 @@ def _lanes_following(
             todo += [(further, between + lengths[after]) for further in follow[after]]
 
 
-def _to_the_side(nodes: NodeTable, follow: list[list[int]], relation: Relation) -> Edges:
+def _link_lane_changes(nodes: NodeTable, follow: list[list[int]], relation: Relation) -> Edges:
     """From each node to the adjacent lane's node about one spacing ahead, where that is permitted.
 
     Near the end of the lane section that node may lie in the one lane that follows the adjacent

@@ -68,7 +68,7 @@ def check_map_graph(graph: MapGraph) -> MapGraph:
     segments, lanes, walks = graph.segments, graph.lanes, graph.walks
     count = len(segments.ids)
     _same_length("segments", count, segments.kinds, segments.parts, segments.lengths)
-    _in_range("segment adjacency", segments.adjacency, 0, count)
+    _check_range("segment adjacency", segments.adjacency, 0, count)
     if segments.adjacency.ndim != 2 or segments.adjacency.shape[1:] != (2,):
         _refuse_column("segment adjacency", f"shape is {segments.adjacency.shape}, not (A, 2)")
     if not set(segments.kinds) <= {"road", "junction"}:
@@ -81,8 +81,8 @@ def check_map_graph(graph: MapGraph) -> MapGraph:
         ("edge", lanes.source, lanes.target, len(lanes.x)),
         ("pedestrian edge", walks.source, walks.target, len(walks.x)),
     ):
-        _in_range(f"{what} source", source, 0, nodes)
-        _in_range(f"{what} target", target, 0, nodes)
+        _check_range(f"{what} source", source, 0, nodes)
+        _check_range(f"{what} target", target, 0, nodes)
     return graph
 
 
@@ -97,12 +97,12 @@ def _check_lanes(graph: MapGraph, segments: int) -> None:
     _same_length("nodes", nodes, lanes.segment)
     if not np.array_equal(lanes.lane, np.repeat(np.arange(rows), np.diff(table.first_node))):
         _refuse_column("nodes", "they are not in the order of their lanes")
-    _in_range("left_lane", lanes.left_lane, -1, rows)
-    _in_range("right_lane", lanes.right_lane, -1, rows)
-    _in_range("segment of a node", lanes.segment, 0, segments)
-    _in_range("lane_change", lanes.lane_change, 0, 4)
+    _check_range("left_lane", lanes.left_lane, -1, rows)
+    _check_range("right_lane", lanes.right_lane, -1, rows)
+    _check_range("segment of a node", lanes.segment, 0, segments)
+    _check_range("lane_change", lanes.lane_change, 0, 4)
     _same_length("edges", len(lanes.source), *(getattr(lanes, name) for name in EDGE_COLUMNS))
-    _in_range("relation", lanes.relation, 0, 3)
+    _check_range("relation", lanes.relation, 0, 3)
 
 
 def _check_walks(graph: MapGraph, segments: int) -> None:
@@ -114,10 +114,10 @@ def _check_walks(graph: MapGraph, segments: int) -> None:
     _same_length("pedestrian nodes", nodes, walks.lane, walks.segment, *columns)
     if not np.array_equal(walks.lane, np.repeat(np.arange(rows), np.diff(walks.first_node))):
         _refuse_column("pedestrian nodes", "they are not in the order of their walks")
-    _in_range("segment of a pedestrian node", walks.segment, 0, segments)
+    _check_range("segment of a pedestrian node", walks.segment, 0, segments)
     columns = [getattr(walks, name) for name in WALK_EDGE_COLUMNS]
     _same_length("pedestrian edges", len(walks.source), walks.crosswalk, *columns)
-    _in_range("kind", walks.kind, 0, 4)
+    _check_range("kind", walks.kind, 0, 4)
 
 
 def _check_first_node(what: str, first_node: Int32Array, rows: int) -> int:
@@ -133,7 +133,7 @@ def _same_length(what: str, count: int, *columns: Any) -> None:
         _refuse_column(what, f"columns have different lengths: {', '.join(map(str, lengths))}")
 
 
-def _in_range(what: str, values: Int32Array | FloatArray | Array, low: int, end: int) -> None:
+def _check_range(what: str, values: Int32Array | FloatArray | Array, low: int, end: int) -> None:
     if len(values) and not (values.min() >= low and values.max() < end):
         _refuse_column(what, f"{values.min()} to {values.max()} is not within {low} to {end - 1}")
 

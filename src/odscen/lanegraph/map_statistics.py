@@ -176,8 +176,8 @@ def map_semantics(odr: OpenDrive, table: RoadTable) -> dict[str, list[dict[str, 
 
 
 def _list_signals(odr: OpenDrive, table: RoadTable) -> list[dict[str, Any]]:
-    found = [(name, signal) for name, road in odr.roads.items() for signal in road.signals]
-    known = [(name, signal, signal_kind(signal)) for name, signal in found]
+    signals = [(name, signal) for name, road in odr.roads.items() for signal in road.signals]
+    known = [(name, signal, signal_kind(signal)) for name, signal in signals]
     known = [item for item in known if item[2] != "other"]
     if not known:
         return []

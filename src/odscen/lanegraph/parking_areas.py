@@ -117,9 +117,9 @@ def map_parking(
     unreached = 0
     for outline in spaces:
         places = list(_places_of(outline))
-        found = [parking for place in places if (parking := beside.lane_of(place)) is not None]
-        reached += found
-        unreached += max(len(places), 1) - len(found)
+        parkings = [parking for place in places if (parking := beside.lane_of(place)) is not None]
+        reached += parkings
+        unreached += max(len(places), 1) - len(parkings)
     for outline in strips:
         cut = list(beside.cut(outline))
         reached += cut

@@ -134,7 +134,7 @@ def build_pedestrians(
         [
             *_edges_along(walks, nodes),
             *_linked_joints(table, walks, nodes, successors),
-            *_near_joints(table, walks, nodes, vehicles),
+            *_find_near_joints(table, walks, nodes, vehicles),
             *_crosswalk_edges(nodes, crosswalks),
         ]
     )
@@ -267,7 +267,7 @@ def _linked_joints(
     return _make_joints(nodes, pairs)
 
 
-def _near_joints(
+def _find_near_joints(
     table: RoadTable, walks: _Walks, nodes: _WalkNodes, vehicles: NodeTable
 ) -> list[_Edge]:
     """Joints between ends of different walks within reach of each other, not across a lane."""
@@ -279,11 +279,11 @@ def _near_joints(
     pairs = some[cKDTree(ends[some]).query_pairs(JOINT_DISTANCE, output_type="ndarray")]
     pairs = pairs[pairs[:, 0] // 2 != pairs[:, 1] // 2]
     middle = (ends[pairs[:, 0]] + ends[pairs[:, 1]]) / 2
-    apart = pairs[~_on_lane(middle, vehicles)]
+    apart = pairs[~_lie_on_lane(middle, vehicles)]
     return _make_joints(nodes, [(one, other) for one, other in apart.tolist()])
 
 
-def _on_lane(places: FloatArray, vehicles: NodeTable) -> BoolArray:
+def _lie_on_lane(places: FloatArray, vehicles: NodeTable) -> BoolArray:
     """Whether each place, shape ``(K, 3)``, lies on a drivable lane."""
     if not len(places) or not len(vehicles.x):
         return np.zeros(len(places), dtype=np.bool_)

@@ -61,7 +61,7 @@ def node_id(graph: MapGraph, i: int) -> NodeId:
 
 def node_ids(graph: MapGraph) -> list[NodeId]:
     """Ids of all lane-graph nodes, in their order."""
-    return _all_ids(graph.lanes.lanes.keys, graph.lanes.lanes.first_node, "")
+    return _make_node_ids(graph.lanes.lanes.keys, graph.lanes.lanes.first_node, "")
 
 
 def node_index(graph: MapGraph, name: str) -> int:
@@ -141,7 +141,7 @@ def walk_node_id(graph: MapGraph, i: int) -> NodeId:
 
 def walk_node_ids(graph: MapGraph) -> list[NodeId]:
     """Ids of all pedestrian nodes, in their order."""
-    return _all_ids(graph.walks.lane_keys, graph.walks.first_node, WALK_PREFIX)
+    return _make_node_ids(graph.walks.lane_keys, graph.walks.first_node, WALK_PREFIX)
 
 
 def walk_node_index(graph: MapGraph, name: str) -> int:
@@ -273,10 +273,10 @@ def parts_with(segments: Segments, ids: Iterable[str]) -> tuple[SegmentId, ...]:
         If the map has no such segment.
     """
     wanted = set(segment_rows(segments, ids).tolist())
-    found = [part for part in _connected_parts(segments) if part & wanted]
-    if not found:
+    wanted_parts = [part for part in _connected_parts(segments) if part & wanted]
+    if not wanted_parts:
         return largest_part(segments)
-    return tuple(segments.ids[row] for row in sorted(set().union(*found)))
+    return tuple(segments.ids[row] for row in sorted(set().union(*wanted_parts)))
 
 
 def _connected_parts(segments: Segments) -> list[set[int]]:
@@ -317,7 +317,7 @@ def _induced_adjacency(segments: Segments, ids: Iterable[str]) -> nx.Graph[int]:
     return graph
 
 
-def _all_ids(keys: tuple[LaneKey, ...], first_node: Int32Array, prefix: str) -> list[NodeId]:
+def _make_node_ids(keys: tuple[LaneKey, ...], first_node: Int32Array, prefix: str) -> list[NodeId]:
     return [
         NodeId(f"{prefix}{key.road}.{key.section}.{key.lane}.{k}")
         for key, count in zip(keys, np.diff(first_node).tolist(), strict=True)

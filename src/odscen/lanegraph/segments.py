@@ -108,7 +108,7 @@ def build_segments(odr: OpenDrive, *, target_length: float = TARGET_LENGTH) -> S
         rows.add_chain(chain, odr)
     for junction, roads in owned.items():
         rows.add_junction(junction, roads)
-    pairs = {*_inside_chains(chains, rows.places), *_across_links(odr, rows)}
+    pairs = {*_pairs_inside_chains(chains, rows.places), *_pairs_across_links(odr, rows)}
     adjacency = sorted({(min(pair), max(pair)) for pair in pairs if pair[0] != pair[1]})
     segments = Segments(
         ids=_make_distinct(rows.ids),
@@ -252,7 +252,7 @@ def _place_segments(
 
 def _segment_parts(chain: _RoadChain, odr: OpenDrive) -> list[tuple[SegmentPart, ...]]:
     """List the stretches of roads in each segment of the chain."""
-    found: list[list[SegmentPart]] = [[] for _ in range(chain.count)]
+    segment_parts: list[list[SegmentPart]] = [[] for _ in range(chain.count)]
     done = 0.0
     for step in chain.steps:
         length = odr.roads[step.road].length
@@ -264,12 +264,12 @@ def _segment_parts(chain: _RoadChain, odr: OpenDrive) -> list[tuple[SegmentPart,
             if high - low < min(MIN_PART, length / 2):
                 continue
             s_from, s_to = (low, high) if step.forward else (length - high, length - low)
-            found[segment].append(SegmentPart(step.road, s_from, s_to))
+            segment_parts[segment].append(SegmentPart(step.road, s_from, s_to))
         done += length
-    return [tuple(parts) for parts in found]
+    return [tuple(parts) for parts in segment_parts]
 
 
-def _inside_chains(
+def _pairs_inside_chains(
     chains: list[_RoadChain], places: Mapping[RoadId, _SegmentSpan]
 ) -> Iterator[tuple[int, int]]:
     for chain in chains:
@@ -280,7 +280,7 @@ def _inside_chains(
             yield base, base + chain.count - 1
 
 
-def _across_links(odr: OpenDrive, rows: _SegmentRows) -> Iterator[tuple[int, int]]:
+def _pairs_across_links(odr: OpenDrive, rows: _SegmentRows) -> Iterator[tuple[int, int]]:
     """Pairs of segments that meet at the end of a road, as its link or a junction says."""
     places = rows.places
     for road in odr.roads.values():
@@ -295,10 +295,10 @@ def _across_links(odr: OpenDrive, rows: _SegmentRows) -> Iterator[tuple[int, int
                 there = _row_at_link(odr, link, places)
             if there is not None:
                 yield here, there
-    yield from _across_connections(odr, places)
+    yield from _pairs_across_connections(odr, places)
 
 
-def _across_connections(
+def _pairs_across_connections(
     odr: OpenDrive, places: Mapping[RoadId, _SegmentSpan]
 ) -> Iterator[tuple[int, int]]:
     """Pairs of segments that a junction's connections name."""

@@ -24,7 +24,6 @@ from odscen.base.system_errors import disk_errors
 from odscen.base.text_files import write_file, write_text
 from odscen.maps.allowances import for_picture
 from odscen.maps.child_process import work_in_child
-from odscen.opendrive.parse import names_projection
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -351,7 +350,7 @@ def _decode_tiff(content: bytes) -> _Decoded:
     """
     with disk_errors("reading the picture"), scratch_folder() as folder:
         (folder / _SENT).write_bytes(content)
-        told = work_in_child(
+        answer = work_in_child(
             f"{__name__}:write_tiff_as_png",
             what="reading the picture",
             arguments={"folder": str(folder)},
@@ -359,8 +358,8 @@ def _decode_tiff(content: bytes) -> _Decoded:
             allowance=for_picture(),
         )
         png = (folder / _UNPACKED).read_bytes()
-    placed = None if told["placed"] is None else cast("Affine", tuple(told["placed"]))
-    return _Decoded(png, "image/png", told["width"], told["height"], placed, told["crs"])
+    placed = None if answer["placed"] is None else cast("Affine", tuple(answer["placed"]))
+    return _Decoded(png, "image/png", answer["width"], answer["height"], placed, answer["crs"])
 
 
 def write_tiff_as_png(*, folder: str, progress: Callable[[str, float], None]) -> dict[str, object]:
@@ -415,12 +414,12 @@ def write_tiff_as_png(*, folder: str, progress: Callable[[str, float], None]) ->
 def _read_geotiff_tags(tags: dict[int, object]) -> tuple[Affine | None, str | None]:
     """Place and coordinate reference system that a GeoTIFF tells, OGC 19-008r4."""
     scale, tie, matrix, keys = (tags.get(tag) for tag in (33550, 33922, 34264, 34735))
-    found: dict[int, int] = {}
+    tag_values: dict[int, int] = {}
     try:
         if keys is not None:
             numbers = [int(value) for value in cast("Sequence[int]", keys)]
             rows = [numbers[at : at + 4] for at in range(4, len(numbers) - 3, 4)]
-            found = {key: value for key, location, _, value in rows if location == 0}
+            tag_values = {key: value for key, location, _, value in rows if location == 0}
         if matrix is not None:
             m = [float(value) for value in cast("Sequence[float]", matrix)]
             affine = (m[0], m[1], m[3], m[4], m[5], m[7])
@@ -432,10 +431,10 @@ def _read_geotiff_tags(tags: dict[int, object]) -> tuple[Affine | None, str | No
             return None, None
     except (TypeError, ValueError, IndexError) as error:
         raise InputError(f"the tags of the GeoTIFF are damaged: {error}") from error
-    if found.get(1025) == 2:  # places are those of the middles of pixels
+    if tag_values.get(1025) == 2:  # places are those of the middles of pixels
         a, b, c, d, e, f = affine
         affine = (a, b, c - (a + b) / 2, d, e, f - (d + e) / 2)
-    code = found.get(3072) or found.get(2048)
+    code = tag_values.get(3072) or tag_values.get(2048)
     return _refuse_flat(affine), f"EPSG:{code}" if code and code < 32_767 else None
 
 
@@ -466,7 +465,7 @@ def _onto_map(affine: Affine, crs: str | None, header: Header, picture: _Decoded
     """Carry a place from its coordinate reference system to the map's coordinates."""
     if crs is None:
         return affine
-    convert = _to_map_metres(crs, header)
+    convert = _make_transformation(crs, header)
     pixels = _find_corners(picture.width, picture.height)
     with np.errstate(invalid="ignore"):  # where a projection has no place there is no number
         x, y = convert(*_place_pixels(affine, pixels))
@@ -484,10 +483,12 @@ def _onto_map(affine: Affine, crs: str | None, header: Header, picture: _Decoded
     return _refuse_flat((a, b, c, d, e, f))
 
 
-def _to_map_metres(
+def _make_transformation(
     crs: str, header: Header
 ) -> Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
     import pyproj
+
+    from odscen.opendrive.parse import names_projection  # late: no run needs what reads OpenDRIVE
 
     if header.crs is None:
         raise InputError(

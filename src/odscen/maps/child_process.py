@@ -236,7 +236,7 @@ def end_waiting() -> None:
             _waiting.pop().end()
 
 
-def _after_fork() -> None:
+def _leave_children() -> None:
     """Leave the children to the process that has them: their pipes must end with it."""
     global _lock  # noqa: PLW0603 - another thread may have held it
     _lock = threading.Lock()
@@ -247,7 +247,7 @@ def _after_fork() -> None:
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_after_fork)
+    os.register_at_fork(after_in_child=_leave_children)
 
 
 def _raise_for(answer: Mapping[str, Any], what: str, allowance: Allowance) -> None:

@@ -198,7 +198,7 @@ class EditedMap:
 
     # ------------------------------------------------------------------ places
     @cached_property
-    def _projections(self) -> tuple[Callable[..., Any], Callable[..., Any]] | None:
+    def _project_corners(self) -> tuple[Callable[..., Any], Callable[..., Any]] | None:
         """Degrees to metres of the map, and back; ``None`` without a usable georeference."""
         header = self.map.header
         if header.crs is None or header.offset[3]:
@@ -217,8 +217,8 @@ class EditedMap:
         EditRefusedError
             If it is in degrees and the map has no usable georeference.
         """
-        if place.lat is not None and self._projections is not None:
-            x, y = self._projections[0](place.lon, place.lat)
+        if place.lat is not None and self._project_corners is not None:
+            x, y = self._project_corners[0](place.lon, place.lat)
             return float(x) - self.map.header.offset[0], float(y) - self.map.header.offset[1]
         if place.x is None:
             raise EditRefusedError(
@@ -228,10 +228,10 @@ class EditedMap:
 
     def degrees_of(self, x: float, y: float) -> tuple[float, float] | None:
         """Longitude and latitude of a place, or ``None`` without a usable georeference."""
-        if self._projections is None:
+        if self._project_corners is None:
             return None
         offset = self.map.header.offset
-        lon, lat = self._projections[1](x + offset[0], y + offset[1])
+        lon, lat = self._project_corners[1](x + offset[0], y + offset[1])
         return float(lon), float(lat)
 
     def _roads_near(self, x: float, y: float) -> list[tuple[int, float, float]]:
@@ -331,7 +331,7 @@ class EditedMap:
             for signal in road.signals:
                 is_light = signal_kind(signal) in ("traffic_light", "pedestrian_light")
                 if is_light == (kind == "light"):
-                    place = self._point(road.id, signal.s, signal.t)
+                    place = self._read_point(road.id, signal.s, signal.t)
                     away = math.hypot(place[0] - xy[0], place[1] - xy[1])
                     parts.append((away, FoundPart(road.id, signal.id)))
         return self._nearest_part(parts, kind, xy)
@@ -379,7 +379,7 @@ class EditedMap:
             raise EditRefusedError(f"there is no {kind} within {REACH:g} m of {where}{nearest}")
         return min(near)[1]
 
-    def _point(self, road: RoadId, s: float, t: float) -> tuple[float, float]:
+    def _read_point(self, road: RoadId, s: float, t: float) -> tuple[float, float]:
         row = np.array([self.table.road_index[road]])
         x, y, _ = self.table.points(row, np.array([s]), np.array([t]))
         return float(x[0]), float(y[0])
@@ -825,7 +825,7 @@ class EditedMap:
         item = next(item for item in road.objects if item.id == part.id)
         t = item.t
         if to is None:
-            s = self._moved_along(road, item.s, by, item.orientation)
+            s = self._clamp_to_road(road, item.s, by, item.orientation)
         else:
             s, there = self._station_on(road.id, to)
             t = there if beside else t
@@ -838,7 +838,7 @@ class EditedMap:
         self._replace_road(replace(road, objects=items))
         return f"road {part.road} > object {part.id}", _say_moved(item.s, item.t, s, t)
 
-    def _moved_along(self, road: model.Road, s: float, by: float, orientation: str) -> float:
+    def _clamp_to_road(self, road: model.Road, s: float, by: float, orientation: str) -> float:
         moved = s - by if orientation == "-" else s + by
         if not 0.0 <= moved <= road.length:
             raise EditRefusedError(f"moved by {by:g} m it is not on road {road.id} any more")
@@ -917,7 +917,7 @@ class EditedMap:
         road = self.map.roads[part.road]
         signal = next(signal for signal in road.signals if signal.id == part.id)
         if to is None:
-            s, t = self._moved_along(road, signal.s, by, signal.orientation), signal.t
+            s, t = self._clamp_to_road(road, signal.s, by, signal.orientation), signal.t
         else:
             s, t = self._station_on(road.id, to)
         signals = tuple(replace(o, s=s, t=t) if o.id == part.id else o for o in road.signals)
@@ -991,7 +991,9 @@ class EditedMap:
         )
 
     # ------------------------------------------------------------------ turns
-    def _through(self, start: FoundLane, end: FoundLane) -> tuple[JunctionId, list[LaneKey]]:
+    def _find_lanes_through(
+        self, start: FoundLane, end: FoundLane
+    ) -> tuple[JunctionId, list[LaneKey]]:
         """The junction between two lanes, and its lanes that lead from one to the other."""
         road = self.map.roads[start.key.road]
         forward = bool(self.table.lane_forward[start.row])
@@ -1019,7 +1021,7 @@ class EditedMap:
         EditRefusedError
             If there is no such turn, or it is the only way on.
         """
-        number, through = self._through(start, end)
+        number, through = self._find_lanes_through(start, end)
         if not through:
             raise EditRefusedError("the first lane does not lead to the second")
         after = lane_successors(self.map)[start.key]
@@ -1067,7 +1069,7 @@ class EditedMap:
         EditRefusedError
             If no junction is between the lanes, or the turn is there already.
         """
-        number, through = self._through(start, end)
+        number, through = self._find_lanes_through(start, end)
         if through:
             raise EditRefusedError("the first lane leads to the second already")
         (begin, z0, w0), (finish, z1, w1) = (

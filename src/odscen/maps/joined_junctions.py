@@ -156,7 +156,7 @@ def _find_chains(
     junctions: set[JunctionId],
 ) -> Iterator[_Chain]:
     """Ways through both junctions, each pair of lanes once."""
-    found = set()
+    seen_pairs = set()
 
     def follow(path: tuple[LaneKey, ...]) -> Iterator[tuple[LaneKey, ...]]:
         for key in after[path[-1]]:
@@ -180,9 +180,9 @@ def _find_chains(
                 end = path[-1]
                 # Not there and back: who leaves by the junction he came from has not been between.
                 entered = {odr.roads[step.road].junction for step in path[1:-1]} - {None}
-                if len(over) != 1 or len(entered) != 2 or (start, end) in found:
+                if len(over) != 1 or len(entered) != 2 or (start, end) in seen_pairs:
                     continue
-                found.add((start, end))
+                seen_pairs.add((start, end))
                 yield _Chain(start, path[1:-1], end)
 
 

@@ -426,7 +426,7 @@ def _pieces_of(
     writer: _Writer, road: RoadId, s: float, orientation: str, validities: Sequence[Validity]
 ) -> list[int]:
     """Lanelets that a signal at s acts on."""
-    found = []
+    lanelets = []
     for piece, lanelet in writer.lanelets.items():
         if piece.key.road != road:
             continue
@@ -444,8 +444,8 @@ def _pieces_of(
                 orientation, True
             )
         if applies:
-            found.append(lanelet)
-    return found
+            lanelets.append(lanelet)
+    return lanelets
 
 
 def _write_signals(writer: _Writer, lines: Mapping[RoadId, list[tuple[float, int]]]) -> None:

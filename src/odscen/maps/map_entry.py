@@ -161,7 +161,7 @@ class MapEntry:
             say_unchecked(self.folder)
             files = self.info["files"]
             known = {files["xodr"]: self.sha256, files["net"]: self.net_sha256}
-            return {name: one for name, one in known.items() if one}
+            return {name: value for name, value in known.items() if value}
         return sums
 
     def graph(self) -> MapGraph:

@@ -207,17 +207,17 @@ class _MBTiles:
         self._connection = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
 
     def zooms(self) -> list[int]:
-        found = self._select_rows("SELECT DISTINCT zoom_level FROM tiles")
-        return [zoom for (zoom,) in found if isinstance(zoom, int) and 0 <= zoom <= _MOST_ZOOM]
+        levels = self._select_rows("SELECT DISTINCT zoom_level FROM tiles")
+        return [zoom for (zoom,) in levels if isinstance(zoom, int) and 0 <= zoom <= _MOST_ZOOM]
 
     def read(self, zoom: int, column: int, row: int) -> bytes | None:
-        found = self._select_rows(
+        tiles = self._select_rows(
             "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ?",
             (zoom, column, 2**zoom - 1 - row),
         )
-        if not found or not isinstance(found[0][0], bytes):
+        if not tiles or not isinstance(tiles[0][0], bytes):
             return None
-        return _refuse_large(found[0][0], f"{zoom}/{column}/{row}")
+        return _refuse_large(tiles[0][0], f"{zoom}/{column}/{row}")
 
     def close(self) -> None:
         """Close the file."""

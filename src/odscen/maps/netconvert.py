@@ -166,8 +166,8 @@ def run_netconvert(
             stderr=subprocess.STDOUT,
         ) as process:
             _limit_child(process.pid, limits)
-            said = _wait_for_output(process, limits.seconds)
-        messages = _clean_messages(said)
+            child_output = _wait_for_output(process, limits.seconds)
+        messages = _clean_messages(child_output)
         if process.returncode != 0 or not made.is_file():
             problem = _describe_problem(process.returncode, messages, limits)
             raise ToolError(problem, output="\n".join(messages))
@@ -176,15 +176,15 @@ def run_netconvert(
 
 def _wait_for_output(process: subprocess.Popen[bytes], seconds: float) -> bytes:
     try:
-        said, _ = process.communicate(timeout=_PATIENCE * seconds)
+        output, _ = process.communicate(timeout=_PATIENCE * seconds)
     except subprocess.TimeoutExpired as error:
         process.kill()
-        said, _ = process.communicate()
+        output, _ = process.communicate()
         raise ToolError(
             f"netconvert did not finish within {_PATIENCE * seconds:g} s",
-            output="\n".join(_clean_messages(said)),
+            output="\n".join(_clean_messages(output)),
         ) from error
-    return said
+    return output
 
 
 def _find_program() -> tuple[Path, dict[str, str]]:
@@ -222,8 +222,8 @@ def _limit_child(pid: int, limits: NetconvertLimits) -> None:
         prlimit(pid, RLIMIT_CORE, (0, 0))
 
 
-def _clean_messages(said: bytes) -> tuple[str, ...]:
-    lines = (line.strip() for line in said.decode("utf-8", "replace").splitlines())
+def _clean_messages(output: bytes) -> tuple[str, ...]:
+    lines = (line.strip() for line in output.decode("utf-8", "replace").splitlines())
     kept = [line for line in lines if line and not any(noise in line for noise in _NOISE)]
     return tuple(dict.fromkeys(kept[:_MESSAGES_KEPT]))
 

@@ -84,14 +84,14 @@ def traffic_losses(report: Mapping[str, Any]) -> TrafficLosses:
         elif fate in ("lost", "repaired"):
             words, counts = (_LOST, lost) if fate == "lost" else (_GUESSED, guessed)
             counts.update(_kind_of(words, reason))
-    return TrafficLosses(_in_order(lost), _in_order(guessed))
+    return TrafficLosses(_order_kinds(lost), _order_kinds(guessed))
 
 
 def _kind_of(words: Iterable[tuple[LossKind, str]], reason: str) -> tuple[LossKind, ...]:
     return tuple(kind for kind, part in words if part in reason)[:1]
 
 
-def _in_order(counts: Mapping[LossKind, int]) -> dict[LossKind, int]:
+def _order_kinds(counts: Mapping[LossKind, int]) -> dict[LossKind, int]:
     return {kind: counts[kind] for kind in get_args(LossKind) if kind in counts}
 
 

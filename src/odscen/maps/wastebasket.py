@@ -128,8 +128,10 @@ class Wastebasket:
 
     def items(self) -> list[RemovedItem]:
         """Everything in the wastebasket, removed last first."""
-        found = [item for folder in self._all_folders() if (item := _read_item(folder)) is not None]
-        return sorted(found, key=lambda item: (item.removed, item.id), reverse=True)
+        kept_items = [
+            item for folder in self._list_folders() if (item := _read_item(folder)) is not None
+        ]
+        return sorted(kept_items, key=lambda item: (item.removed, item.id), reverse=True)
 
     def item(self, id_: str) -> RemovedItem:
         """One item by its id, or by its name where only one of that name is here.
@@ -142,21 +144,21 @@ class Wastebasket:
             If several have that name.
         """
         items = self.items()
-        found = [item for item in items if item.id == id_] or [
+        matching = [item for item in items if item.id == id_] or [
             item for item in items if item.name == id_
         ]
-        if not found:
+        if not matching:
             raise NotFoundError(
                 "item of the wastebasket",
                 id_,
                 [name for item in items for name in (item.id, item.name)],
             )
-        if len(found) > 1:
-            ids = ", ".join(item.id for item in found)
+        if len(matching) > 1:
+            ids = ", ".join(item.id for item in matching)
             raise ConflictError(
                 f"several items of the wastebasket are named {id_!r}; say which: {ids}"
             )
-        return found[0]
+        return matching[0]
 
     def restore(self, id_: str) -> RemovedItem:
         """Put an item back where it was.
@@ -197,13 +199,13 @@ class Wastebasket:
     def sweep(self, now: datetime | None = None) -> None:
         """Delete what is here for longer than 30 days at ``now`` (UTC), and leftovers."""
         now = now or datetime.now(UTC)
-        for folder in self._all_folders():
+        for folder in self._list_folders():
             item, removed = _read_item(folder), _time_of_removal(folder)
             if now - removed > (KEPT if item is not None else _UNFINISHED):
                 with suppress(OSError):  # another process was faster, or the next time
                     shutil.rmtree(folder)
 
-    def _all_folders(self) -> Iterator[Path]:
+    def _list_folders(self) -> Iterator[Path]:
         for kind, parent in self._folders.items():
             with suppress(OSError):
                 for folder in sorted((parent / FOLDER).iterdir()):

@@ -219,14 +219,14 @@ class World:
 
         body = self._bodies[row]
         rows = {id(other): number for number, other in self._bodies.items()}
-        found = set()
+        others = set()
         world = self._engine.physics_world.dynamic_world
         for contact in world.contactTest(body.chassis.node(), True).getContacts():
             for node in (contact.getNode0(), contact.getNode1()):
                 other = rows.get(id(get_object_from_node(node)))
                 if other is not None and other != row:
-                    found.add(other)
-        return sorted(found)
+                    others.add(other)
+        return sorted(others)
 
     # -------------------------------------------------------------------------------------- map
     def _build_map(self) -> Any:

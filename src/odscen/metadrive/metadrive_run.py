@@ -110,7 +110,7 @@ class MetaDrive(Simulator[MetaDriveRun]):
     def unsupported(self, scenario: Scenario, on: SimulatedMap) -> tuple[Problem, ...]:
         """List what MetaDrive does not do of a scenario."""
         heights = on.graph.lanes.z
-        found = [
+        warnings = [
             warning(
                 "not_in_metadrive",
                 "environment",
@@ -118,7 +118,7 @@ class MetaDrive(Simulator[MetaDriveRun]):
             )
         ]
         if len(heights) and float(np.ptp(heights)) > 1.0:
-            found.append(
+            warnings.append(
                 warning(
                     "not_in_metadrive",
                     "map",
@@ -127,14 +127,14 @@ class MetaDrive(Simulator[MetaDriveRun]):
             )
         egos = {actor.id for actor in scenario.actors if actor.ego}
         if self.traffic == "idm" or (self.ego == "idm" and egos):
-            found.append(
+            warnings.append(
                 warning(
                     "not_in_metadrive",
                     "actors",
                     "who is driven by MetaDrive's IDM sees no traffic light, sign or right of way",
                 )
             )
-        found += [
+        warnings += [
             warning(
                 "not_in_metadrive",
                 f"rules[{index}]",
@@ -143,7 +143,7 @@ class MetaDrive(Simulator[MetaDriveRun]):
             for index, rule in enumerate(scenario.rules)
             if (self.ego if rule.actor in egos else self.traffic) == "idm"
         ]
-        return tuple(found)
+        return tuple(warnings)
 
     def check_settings(self, settings: RunSettings) -> None:
         """Refuse what SUMO refuses, and runs without microscopic traffic."""
@@ -283,8 +283,8 @@ class MetaDrive(Simulator[MetaDriveRun]):
             child.wait()
         if child.returncode:
             words = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
-            said = words[-1] if words else "it said nothing"
-            return f"MetaDrive's process ended with {child.returncode}: {said}", False
+            last_words = words[-1] if words else "it said nothing"
+            return f"MetaDrive's process ended with {child.returncode}: {last_words}", False
         return None, False
 
 

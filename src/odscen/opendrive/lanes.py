@@ -262,7 +262,7 @@ class RoadTable:
             row = lane[at] - side[at] * (rank[at] - np.int64(k))
             for part, done in zip(outer, inner, strict=True):
                 done[at] = part[at]
-            width = _not_negative(self.widths.at(row, s[at]))
+            width = _clip_negative_width(self.widths.at(row, s[at]))
             for part, value in zip(outer, width, strict=True):
                 part[at] += side[at] * value
             if has_borders:
@@ -352,7 +352,7 @@ def _road_speeds(road: Road) -> list[tuple[float, float]]:
     return [(t.s, np.nan if t.speed is None else t.speed) for t in road.types]
 
 
-def _not_negative(
+def _clip_negative_width(
     width: tuple[FloatArray, FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Zero where a width polynomial dips below zero."""

@@ -100,14 +100,14 @@ def object_outline(table: RoadTable, road: RoadId, obj: RoadObject) -> tuple[Flo
         local = obj.radius * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
     else:
         return ()
-    return (_from_local(table, row, obj, local),)
+    return (_local_to_inertial(table, row, obj, local),)
 
 
 def _outline_corners(table: RoadTable, road: int, obj: RoadObject, outline: Outline) -> FloatArray:
     values = np.array([(c.a, c.b, c.z) for c in outline.corners], dtype=np.float64)
     is_local = np.array([c.local for c in outline.corners])
     points = np.empty_like(values)
-    points[is_local] = _from_local(table, road, obj, values[is_local])
+    points[is_local] = _local_to_inertial(table, road, obj, values[is_local])
     s, t, z = values[~is_local].T
     points[~is_local] = np.stack(table.points(np.full(s.shape, road), s, t, z), axis=1)
     # Files of the 1.4 age repeat the first corner at the end.
@@ -115,7 +115,9 @@ def _outline_corners(table: RoadTable, road: int, obj: RoadObject, outline: Outl
     return points[:-1].copy() if closed else points
 
 
-def _from_local(table: RoadTable, road: int, obj: RoadObject, local: FloatArray) -> FloatArray:
+def _local_to_inertial(
+    table: RoadTable, road: int, obj: RoadObject, local: FloatArray
+) -> FloatArray:
     """Inertial points of the object's (u, v, z): its place on the road, turned by its heading."""
     row, s, t = np.array([road]), np.array([obj.s]), np.array([obj.t])
     line = table.reference(row, s)
@@ -135,14 +137,14 @@ def crosswalks(odr: OpenDrive, table: RoadTable) -> tuple[Crosswalk, ...]:
     """All crosswalks, in the order of the file; objects without a size are left out."""
     found = (
         _make_crosswalk(table, road, obj, outline)
-        for road, obj in _all_objects(odr)
+        for road, obj in _iterate_objects(odr)
         if is_crosswalk(obj)
         for outline in object_outline(table, road, obj)[:1]
     )
     return tuple(crosswalk for crosswalk in found if crosswalk is not None)
 
 
-def _all_objects(odr: OpenDrive) -> Iterator[tuple[RoadId, RoadObject]]:
+def _iterate_objects(odr: OpenDrive) -> Iterator[tuple[RoadId, RoadObject]]:
     return ((road.id, obj) for road in odr.roads.values() for obj in road.objects)
 
 
@@ -222,7 +224,9 @@ def _middle_chord(polygon: FloatArray, along: FloatArray) -> FloatArray:
 
 def stop_lines(odr: OpenDrive, table: RoadTable) -> tuple[StopLine, ...]:
     """All stop lines, in the order of the file; objects without any length are left out."""
-    found = (_stop_line(table, road, obj) for road, obj in _all_objects(odr) if is_stop_line(obj))
+    found = (
+        _stop_line(table, road, obj) for road, obj in _iterate_objects(odr) if is_stop_line(obj)
+    )
     return tuple(line for line in found if line is not None)
 
 
@@ -234,7 +238,7 @@ def _stop_line(table: RoadTable, road: RoadId, obj: RoadObject) -> StopLine | No
         # A line without thickness: its length lies along u, its width along v.
         u, v = 0.5 * (obj.length or 0.0), 0.0 if obj.length else 0.5 * (obj.width or 0.0)
         local = np.array([[-u, -v, 0.0], [u, v, 0.0]])
-        points = _from_local(table, table.road_index[road], obj, local)
+        points = _local_to_inertial(table, table.road_index[road], obj, local)
     else:
         return None
     if len(points) > 2:

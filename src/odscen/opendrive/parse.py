@@ -18,12 +18,15 @@ from lxml.etree import tostring
 from odscen.base.errors import OpenDriveError, in_file
 from odscen.base.shown import shown, shown_id
 from odscen.opendrive.parse_checks import check_numbers, find_faults
-from odscen.opendrive.parse_coincident import merge_coincident_roads
 from odscen.opendrive.parse_junctions import parse_controller, parse_junction
 from odscen.opendrive.parse_left_out import RoadFault, leave_out_faulty
 from odscen.opendrive.parse_lengths import fit_lengths
 from odscen.opendrive.parse_references import check_references
-from odscen.opendrive.parse_repairs import free_roads_of_no_junction, repair_junction_tables
+from odscen.opendrive.parse_repairs import (
+    free_roads_of_no_junction,
+    merge_coincident_roads,
+    repair_junction_tables,
+)
 from odscen.opendrive.parse_road import parse_road
 from odscen.opendrive.parse_rules import MAX_BYTES, MAX_TAGS, Notes, Rule, SkippedElements
 from odscen.opendrive.parse_xml import (
@@ -152,8 +155,8 @@ def _decode_as_meant(text: str | bytes, notes: Notes) -> str | bytes:
     """
     if isinstance(text, str) or b"\0" in text:  # UTF-16 has NUL bytes
         return text
-    declared = _DECLARED_ENCODING.match(text)
-    name = declared[1].decode().lower().replace("-", "") if declared else "utf8"
+    match = _DECLARED_ENCODING.match(text)
+    name = match[1].decode().lower().replace("-", "") if match else "utf8"
     if name not in ("utf8", "utf16"):
         return text
     try:

@@ -147,26 +147,26 @@ def _parse_section(element: Element, s: float, s_end: float, notes: Notes) -> La
     if s_end <= s:
         notes.add(Rule.ZERO_LENGTH, element, f"starts and ends at s={s:g}; its lanes have no place")
     groups = children(element)
-    found: list[Lane] = []
+    lanes: list[Lane] = []
     for side in ("left", "center", "right"):
         container = only(groups, side)
         if container is None:
             continue
         for child in container:
             if child.tag == "lane":
-                found.append(_parse_lane(child, side, s, s_end, notes))
+                lanes.append(_parse_lane(child, side, s, s_end, notes))
             elif child.tag != "userData":
                 notes.skip(Rule.UNKNOWN, side, str(child.tag))
-    if not any(lane.id == 0 for lane in found):
+    if not any(lane.id == 0 for lane in lanes):
         notes.add(Rule.NO_CENTER, element, "there is no center lane")
-        found.append(Lane(0, "none"))
-    found.sort(key=lambda lane: -lane.id)
-    found = _open_sole_lane(found)
-    _check_ids(element, [lane.id for lane in found], notes)
+        lanes.append(Lane(0, "none"))
+    lanes.sort(key=lambda lane: -lane.id)
+    lanes = _open_sole_lane(lanes)
+    _check_ids(element, [lane.id for lane in lanes], notes)
     return LaneSection(
         s,
         s_end,
-        {lane.id: lane for lane in found},
+        {lane.id: lane for lane in lanes},
         single_side=_drawn_boolean(element, "singleSide", notes),
     )
 
@@ -317,7 +317,7 @@ def _parse_s(element: Element, s0: float) -> float:
 
 
 def _parse_heights(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneHeight, ...]:
-    found = []
+    heights = []
     for element in elements:
         names = ("inner", "outer")
         if not any(element.get(name) for name in names):
@@ -328,23 +328,23 @@ def _parse_heights(elements: Sequence[Element], s0: float, notes: Notes) -> tupl
                 notes.add(Rule.OLD_NAMES, element, "heightInner, heightOuter are inner, outer")
         try:
             inner, outer = (number(element, name) for name in names)
-            found.append((element, LaneHeight(_parse_s(element, s0), inner, outer)))
+            heights.append((element, LaneHeight(_parse_s(element, s0), inner, outer)))
         except OpenDriveError as error:
             notes.add(Rule.PAINT, element, f"{error.problem}; the height is left out")
-    return _in_order(found, notes)
+    return _sort_records(heights, notes)
 
 
 def _parse_speeds(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneSpeed, ...]:
-    found: list[tuple[Element, LaneSpeed]] = []
+    speeds: list[tuple[Element, LaneSpeed]] = []
     for element in elements:
         value = speed(element, notes)
         if value is None:
             continue
         try:
-            found.append((element, LaneSpeed(_parse_s(element, s0), value)))
+            speeds.append((element, LaneSpeed(_parse_s(element, s0), value)))
         except OpenDriveError as error:
             notes.add(Rule.SPEED, element, f"{error.problem}; no speed is given")
-    return _in_order(found, notes)
+    return _sort_records(speeds, notes)
 
 
 _ACCESS_RULES: Final[dict[str | None, str]] = {
@@ -357,7 +357,7 @@ _ACCESS_RULES: Final[dict[str | None, str]] = {
 
 def _parse_access(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[LaneAccess, ...]:
     """One record per restriction: an attribute up to 1.7, elements below from 1.8 on."""
-    found = []
+    accesses = []
     for element in elements:
         rule = spelt_choice(element, "rule", _ACCESS_RULES, notes, otherwise="")
         below = [str(child.get("type", "")) for child in element if child.tag == "restriction"]
@@ -373,8 +373,8 @@ def _parse_access(elements: Sequence[Element], s0: float, notes: Notes) -> tuple
             detail = f"{error.problem}; the access is left out"
             notes.add(Rule.ACCESS_LEFT_OUT, element, detail)
             continue
-        found += [(element, LaneAccess(s, rule, name)) for name in names]
-    return _in_order(found, notes)
+        accesses += [(element, LaneAccess(s, rule, name)) for name in names]
+    return _sort_records(accesses, notes)
 
 
 _RESTRICTIONS: Final = {
@@ -430,7 +430,7 @@ def _road_marks(elements: Sequence[Element], s0: float, notes: Notes) -> tuple[R
             )
         )
         placed.append(element)
-    return _in_order(list(zip(placed, marks, strict=True)), notes)
+    return _sort_records(list(zip(placed, marks, strict=True)), notes)
 
 
 def _painted_width(element: Element, notes: Notes) -> float:
@@ -445,7 +445,7 @@ def _painted_width(element: Element, notes: Notes) -> float:
 _start = attrgetter("s")
 
 
-def _in_order(found: Sequence[tuple[Element, R]], notes: Notes) -> tuple[R, ...]:
+def _sort_records(found: Sequence[tuple[Element, R]], notes: Notes) -> tuple[R, ...]:
     """Records with the elements that they are from, in ascending order of s."""
     for (_, before), (element, record) in itertools.pairwise(found):
         if record.s < before.s:

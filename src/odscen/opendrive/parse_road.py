@@ -379,8 +379,8 @@ def _is_normalized(shape: Element, values: Sequence[float], length: float, notes
     Where ``pRange`` says neither, the one by which the curve is as long as it is said to be holds.
     """
     known = {str(name).lower() for name in _P_RANGES}
-    said = shape.get("pRange")
-    if said is None or said.strip().lower() in known:
+    p_range = shape.get("pRange")
+    if p_range is None or p_range.strip().lower() in known:
         return spelt_choice(shape, "pRange", _P_RANGES, notes)
     fits = []
     for name, most in (("arcLength", length), ("normalized", 1.0)):
@@ -391,7 +391,9 @@ def _is_normalized(shape: Element, values: Sequence[float], length: float, notes
             fits.append(name)
     if len(fits) != 1:
         return choice(shape, "pRange", _P_RANGES)
-    detail = f"pRange={shown(said)} is read as {fits[0]}, by which the curve is as long as it says"
+    detail = (
+        f"pRange={shown(p_range)} is read as {fits[0]}, by which the curve is as long as it says"
+    )
     notes.add(Rule.UNKNOWN_VALUE, shape, detail)
     return fits[0] == "normalized"
 

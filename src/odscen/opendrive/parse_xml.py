@@ -126,10 +126,10 @@ def number(element: Element, name: str, *, limit: float = 1e9) -> float:
     # NaN is not between anything. "1_000" is a number in Python, but not in XML.
     if -limit <= value <= limit and "_" not in cast("str", text):
         return value
-    raise _no_number(element, name, limit)
+    raise _number_error(element, name, limit)
 
 
-def _no_number(element: Element, name: str, limit: float) -> OpenDriveError:
+def _number_error(element: Element, name: str, limit: float) -> OpenDriveError:
     """What is wrong with an attribute that :func:`number` refuses."""
     text = required(element, name)
     try:
@@ -166,9 +166,9 @@ def number_or(element: Element, name: str, default: float) -> float:
 def integer(element: Element, name: str, *, limit: int = 10**9) -> int:
     """A whole number that must be there."""
     text = required(element, name)
-    whole = _WHOLE.fullmatch(text.strip())
+    match = _WHOLE.fullmatch(text.strip())
     try:
-        value = int(whole[1] if whole else text.replace("_", "?"))
+        value = int(match[1] if match else text.replace("_", "?"))
     except ValueError as err:
         raise refusal(element, f"{name}={shown(text)} is not a whole number") from err
     if abs(value) > limit:

@@ -22,11 +22,11 @@ def road_names(content: bytes) -> dict[str, str]:
     content
         The whole file.
     """
-    found = {}
+    names = {}
     for tag in _ROAD.findall(content):
         text = tag.decode("utf-8", "replace")
         values = {key: unescape(a or b).strip() for key, a, b in _ATTRIBUTE.findall(text)}
         name = values.get("name", "")
         if "id" in values and not _GENERATED.fullmatch(name):
-            found[values["id"]] = " ".join(name.split())
-    return found
+            names[values["id"]] = " ".join(name.split())
+    return names

@@ -58,7 +58,7 @@ def lane_successors(odr: OpenDrive) -> dict[LaneKey, tuple[LaneKey, ...]]:
         found[here].add(there)
     for junction in odr.junctions.values():
         for connection in junction.connections:
-            for here, there in _through_connection(junction, connection, odr):
+            for here, there in _relate_connection(junction, connection, odr):
                 found[here].add(there)
     return {
         key: tuple(sorted(keys, key=lambda k: (order[k.road], k.section, k.lane)))
@@ -149,7 +149,7 @@ def _lane_enters(road: Road, section: int, lane_id: int, contact: End) -> bool:
     return lane is not None and is_forward(road, lane) == (contact == "start")
 
 
-def _through_connection(
+def _relate_connection(
     junction: Junction, connection: Connection, odr: OpenDrive
 ) -> Iterator[tuple[LaneKey, LaneKey]]:
     """Relations between an incoming road and the connecting or linked road."""
@@ -219,7 +219,7 @@ def dead_ends(odr: OpenDrive) -> tuple[DeadEnd, ...]:
     successors = lane_successors(odr)
     reached = {there for following in successors.values() for there in following}
     beside = {(side.other, side.leaves) for side in side_links(odr)}
-    found: list[DeadEnd] = []
+    dead_ends: list[DeadEnd] = []
     for key, following in successors.items():
         road = odr.roads[key.road]
         lane = road.sections[key.section].lanes[key.lane]
@@ -230,8 +230,8 @@ def dead_ends(odr: OpenDrive) -> tuple[DeadEnd, ...]:
         for end, leads, joined in ((ends[0], False, key in reached), (ends[1], True, following)):
             at_end = key.section == end_section(road, end)
             if at_end and not joined and (key, not leads) not in beside:
-                found.append(DeadEnd(key, end, leads))
-    return tuple(found)
+                dead_ends.append(DeadEnd(key, end, leads))
+    return tuple(dead_ends)
 
 
 def cut_off_lanes(odr: OpenDrive) -> frozenset[LaneKey]:
@@ -324,7 +324,7 @@ class SideLink(NamedTuple):
 
 def side_links(odr: OpenDrive) -> tuple[SideLink, ...]:
     """Links of connecting roads to places within a road, as virtual junctions have them."""
-    found: dict[SideLink, None] = {}
+    links: dict[SideLink, None] = {}
     for road in odr.roads.values():
         ends: tuple[tuple[End, RoadLink | None], ...] = (
             ("start", road.predecessor),
@@ -335,8 +335,8 @@ def side_links(odr: OpenDrive) -> tuple[SideLink, ...]:
                 continue
             main = odr.roads.get(RoadId(link.element_id))
             if main is not None and main is not road and link.contact_point is None:
-                found.update(dict.fromkeys(_lanes_beside_end(odr, road, end, main, link.element_s)))
-    return tuple(found)
+                links.update(dict.fromkeys(_lanes_beside_end(odr, road, end, main, link.element_s)))
+    return tuple(links)
 
 
 def _lanes_beside_end(

@@ -274,11 +274,11 @@ def _write_speed(parent: Element, speed: float, **place: float) -> None:
     if math.isinf(speed):
         _append_element(parent, "speed", **place, max="no limit")
         return
-    value, unit = _in_unit_of_signs(speed)
+    value, unit = _choose_sign_unit(speed)
     _append_element(parent, "speed", **place, max=value, unit=unit)
 
 
-def _in_unit_of_signs(speed: float) -> tuple[str, str]:
+def _choose_sign_unit(speed: float) -> tuple[str, str]:
     """Speed of m/s as number and unit: km/h or mph where that is a whole number."""
     for unit, per_mps in _SPEED_UNITS:
         value = speed * per_mps
@@ -453,7 +453,7 @@ def _write_signal(signals: Element, signal: Signal) -> None:
     value = None if signal.value is None else number(signal.value, 9)
     unit = signal.unit
     if unit == "m/s" and signal.value is not None:
-        value, unit = _in_unit_of_signs(signal.value)
+        value, unit = _choose_sign_unit(signal.value)
     element = _append_element(
         signals,
         "signal",

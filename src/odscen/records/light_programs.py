@@ -136,7 +136,7 @@ class StageSpan(NamedTuple):
 
 def stage_spans(plan: ShownPlan) -> tuple[StageSpan, ...]:
     """Stages of a plan in order, once each; their splits add up to the cycle."""
-    found: list[StageSpan] = []
+    spans: list[StageSpan] = []
     now, last = 0.0, ""
     for phase in plan.phases:
         begin, now = now, now + phase.seconds
@@ -144,20 +144,20 @@ def stage_spans(plan: ShownPlan) -> tuple[StageSpan, ...]:
             last = ""
             continue
         if phase.stage == last:
-            span = found[-1]
+            span = spans[-1]
             held = span.seconds if phase.most > phase.least else 0.0
-            found[-1] = span._replace(end=now, least=held + phase.least, most=held + phase.most)
+            spans[-1] = span._replace(end=now, least=held + phase.least, most=held + phase.most)
             continue
         last = phase.stage
-        found.append(
+        spans.append(
             StageSpan(
                 phase.stage, begin, now, 0.0, phase.least, phase.most, phase.on_call, phase.state
             )
         )
-    begins = [span.begin for span in found[1:]] + [plan.cycle + span.begin for span in found[:1]]
+    begins = [span.begin for span in spans[1:]] + [plan.cycle + span.begin for span in spans[:1]]
     return tuple(
-        one._replace(split=following - one.begin)
-        for one, following in zip(found, begins, strict=True)
+        span._replace(split=following - span.begin)
+        for span, following in zip(spans, begins, strict=True)
     )
 
 

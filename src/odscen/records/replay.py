@@ -156,9 +156,9 @@ def speeds_of_positions(
     slips = ~walking[1:] & (np.abs(error) * passed < LANE_JOINT)
     error = np.where(slips, _median_of_three(error, same), error)
     error[np.abs(error) <= SPEED_ERROR] = 0.0
-    found = np.empty_like(speed)
-    found[order] = np.maximum(old + np.concatenate(([0.0], error)), 0.0)
-    return found
+    speeds = np.empty_like(speed)
+    speeds[order] = np.maximum(old + np.concatenate(([0.0], error)), 0.0)
+    return speeds
 
 
 def _median_of_three(values: FloatArray, joined: BoolArray) -> FloatArray:

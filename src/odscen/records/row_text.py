@@ -35,8 +35,8 @@ def numbers(names: pl.Series) -> tuple[IntArray, list[str]]:
     import polars as pl
 
     kind = names.dtype if isinstance(names.dtype, pl.Enum) else _enum_of(names)
-    found: IntArray = names.cast(kind).to_physical().to_numpy()
-    return found, kind.categories.to_list()
+    codes: IntArray = names.cast(kind).to_physical().to_numpy()
+    return codes, kind.categories.to_list()
 
 
 def numbers_among(names: pl.Series, known: pl.Series) -> IntArray:
@@ -46,8 +46,8 @@ def numbers_among(names: pl.Series, known: pl.Series) -> IntArray:
     number, named = numbers(names)
     row = {name: k for k, name in enumerate(known)}
     kind = np.min_scalar_type(len(row))  # numpy sorts small numbers sooner
-    found: IntArray = np.array([row.get(name, 0) for name in named], dtype=kind)[number]
-    return found
+    codes: IntArray = np.array([row.get(name, 0) for name in named], dtype=kind)[number]
+    return codes
 
 
 def among(column: str, names: pl.Series, kind: pl.DataType) -> pl.Expr:
@@ -70,9 +70,9 @@ def changes(values: IntArray | FloatArray) -> BoolArray:
     """Whether a value is another than the one before it, ``(N,)``; the first one is."""
     import numpy as np
 
-    found = np.ones(len(values), dtype=np.bool_)
-    found[1:] = values[1:] != values[:-1]
-    return found
+    is_change = np.ones(len(values), dtype=np.bool_)
+    is_change[1:] = values[1:] != values[:-1]
+    return is_change
 
 
 def _enum_of(names: pl.Series) -> pl.Enum:

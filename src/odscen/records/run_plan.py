@@ -245,16 +245,16 @@ class Plan:
         if self.measures:
             head["measures"] = [asdict(measure) for measure in self.measures]
             head["closed"] = [without_defaults(period, _CLOSED_DEFAULTS) for period in self.closed]
-        said: dict[str, Any] = {
+        data: dict[str, Any] = {
             "warm_up": self.warm_up,
             "interval": self.interval,
             "clock": self.clock,
         }
-        said["stations"] = [asdict(station) for station in self.stations]
-        said["parking"] = [asdict(parking) for parking in self.parking]
-        said["criteria"] = list(self.criteria)
-        said["scene"], said["awaits"] = self.scene, list(self.awaits)
-        head |= {name: value for name, value in said.items() if value}
+        data["stations"] = [asdict(station) for station in self.stations]
+        data["parking"] = [asdict(parking) for parking in self.parking]
+        data["criteria"] = list(self.criteria)
+        data["scene"], data["awaits"] = self.scene, list(self.awaits)
+        head |= {name: value for name, value in data.items() if value}
         if self.after_story is not None:
             head["after_story"] = self.after_story
         return json_with_rows(
@@ -292,14 +292,14 @@ def _make_nested(
 ) -> tuple[_Row, ...]:
     """Make rows of which some fields, if they are there, have tuples, or tuples of tuples."""
     return tuple(
-        make({**row, **{name: _as_tuples(row[name]) for name in names if name in row}})
+        make({**row, **{name: _lists_to_tuples(row[name]) for name in names if name in row}})
         for row in rows
     )
 
 
-def _as_tuples(value: Any) -> Any:
+def _lists_to_tuples(value: Any) -> Any:
     """Lists, and those in them, as tuples."""
-    return tuple(map(_as_tuples, value)) if isinstance(value, list) else value
+    return tuple(map(_lists_to_tuples, value)) if isinstance(value, list) else value
 
 
 _PLANNED_ACTOR = typed_rows(PlannedActor)

@@ -81,9 +81,9 @@ def _begins_a_piece(rows: pl.DataFrame, number: IntArray) -> BoolArray:
     # Some teleports end in the step they begin: none covers ten metres more than driving takes.
     moved = np.sqrt(np.diff(x) ** 2 + np.diff(y) ** 2)
     away |= moved > 2.0 * pause * np.fmax(speed[1:], speed[:-1]) + 10.0
-    found = np.zeros(len(time), dtype=np.bool_)
-    found[1:] = away | (number[1:] != number[:-1])
-    return found
+    is_begin = np.zeros(len(time), dtype=np.bool_)
+    is_begin[1:] = away | (number[1:] != number[:-1])
+    return is_begin
 
 
 def _column_names(columns: list[str]) -> dict[str, str] | None:

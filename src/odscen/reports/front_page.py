@@ -67,8 +67,8 @@ def worst_movements(figures: TrafficFigures) -> dict[str, dict[str, Any]]:
     counted = pl.coalesce("passages", "vehicles")
     busy = table.filter((counted >= FEW) & pl.col("shown").is_not_null())
     ordered = busy.sort(["shown", "movement"], descending=[True, False])
-    found = ordered.unique("junction", keep="first", maintain_order=True)
-    return {row["junction"]: row for row in found.iter_rows(named=True)}
+    worst_rows = ordered.unique("junction", keep="first", maintain_order=True)
+    return {row["junction"]: row for row in worst_rows.iter_rows(named=True)}
 
 
 def advise(junction: Mapping[str, Any], worst: Mapping[str, Any] | None) -> str:

@@ -61,7 +61,7 @@ def render_picture_sheet(
         (moment.time, _draw_plan(moment, drawing, number), _embed_picture(moment, shown_by))
         for number, moment in enumerate(moments)
     ]
-    present = {one for moment in moments for one in moment.categories}
+    present = {category for moment in moments for category in moment.categories}
     return render_page(
         "picture_sheet.html.j2",
         title=f"{scenario} - the plan and {shown_by} side by side",
@@ -79,12 +79,12 @@ def corners_of(moment: SheetMoment) -> FloatArray:
     across = np.column_stack([-along[:, 1], along[:, 0]])
     signs = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) / 2.0
     halves = signs[None] * moment.sizes[:, None]
-    found: FloatArray = (
+    corners: FloatArray = (
         moment.poses[:, None, :2]
         + halves[..., :1] * along[:, None]
         + halves[..., 1:] * across[:, None]
     )
-    return found
+    return corners
 
 
 def _draw_plan(moment: SheetMoment, drawing: MapDrawing, number: int) -> Markup:

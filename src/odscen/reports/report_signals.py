@@ -13,6 +13,7 @@ from odscen.reports.signal_pictures import (
     JunctionPictures,
 )
 from odscen.reports.signal_sheet import (
+    CONTROL_WORDS,
     DETECTOR_HEADS,
     SPLIT_HEADS,
     detector_rows,
@@ -105,7 +106,7 @@ def _light_values(
     used = lights.use.filter(lights.use["junction"] == light.junctions[0]).select(columns)
     return {
         "name": _name_light(light, names),
-        "control": {"fixed": "fixed-time", "actuated": "actuated"}[light.control],
+        "control": CONTROL_WORDS[light.control],
         "own": light.own,
         "ground": pictures.ground(),
         "site": pictures.site(),

@@ -720,8 +720,10 @@ def _event_values(
 def _event_row(event: Event, names: PlaceNames) -> _EventRow:
     words, reason = EVENT_WORDS[event.kind]
     if event.rule:
-        said = [_name_rule_value(name, value) for name, value in (event.values or {}).items()]
-        values = ", ".join(filter(None, said))
+        named_values = [
+            _name_rule_value(name, value) for name, value in (event.values or {}).items()
+        ]
+        values = ", ".join(filter(None, named_values))
         words += f": {event.rule}" + (f" ({values})" if values else "")
     if event.partner:
         words += f" with {event.partner}"

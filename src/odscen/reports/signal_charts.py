@@ -75,7 +75,7 @@ def phase_spans(plan: ShownPlan) -> list[PhaseSpan]:
     Yellow is what shows yellow to a group, all-red what shows green to none, and the rest between
     stages is for pedestrian clearance and groups that begin before the others.
     """
-    found: list[PhaseSpan] = []
+    spans: list[PhaseSpan] = []
     now = 0.0
     for phase in plan.phases:
         begin, now = now, now + phase.seconds
@@ -86,11 +86,11 @@ def phase_spans(plan: ShownPlan) -> list[PhaseSpan]:
             kind = "yellow"
         elif not set(phase.state) & {"G", "g"}:
             kind = "all-red"
-        if found and (found[-1].kind, found[-1].stage) == (kind, phase.stage):
-            found[-1] = found[-1]._replace(end=now)
+        if spans and (spans[-1].kind, spans[-1].stage) == (kind, phase.stage):
+            spans[-1] = spans[-1]._replace(end=now)
         else:
-            found.append(PhaseSpan(begin, now, kind, phase.stage))
-    return found
+            spans.append(PhaseSpan(begin, now, kind, phase.stage))
+    return spans
 
 
 class BarScale(NamedTuple):

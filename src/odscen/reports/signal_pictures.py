@@ -263,10 +263,12 @@ class JunctionPictures:
         if self._drawing is not None:
             ground = element("use", href=f"#{self._ident}")
         gives_way = " ".join(stage.groups(light, "g"))
-        told = f"{words}; green: {names}" + (f"; gives way: {gives_way}" if gives_way else "")
+        description = f"{words}; green: {names}" + (
+            f"; gives way: {gives_way}" if gives_way else ""
+        )
         picture = element(
             "svg",
-            element("title", told),
+            element("title", description),
             ground,
             *(shape for kind, shape in shapes if kind == "red"),
             *(shape for kind, shape in shapes if kind != "red"),

@@ -26,6 +26,13 @@ if TYPE_CHECKING:
     )
 
 
+CONTROL_WORDS = {
+    "fixed": "fixed-time",
+    "extended": "fixed-time, extended",
+    "actuated": "actuated",
+}
+"""What controls of lights are called."""
+
 SPLIT_HEADS = ("Stage", "Green, s", "Split, s", "Split, %", "Groups")
 DETECTOR_HEADS = ("Detector", "Number", "Before the stop line, m", "Gap, s", "For")
 
@@ -115,11 +122,11 @@ class _Sheet:
     def document(self) -> Markup:
         light = self._light
         name = f"Traffic light of junction {', '.join(light.junctions)}"
-        control = {"fixed": "fixed-time", "actuated": "actuated"}[light.control]
+        control = CONTROL_WORDS[light.control]
         whose = "program of the scenario" if light.own else "program of the map"
         self._draw_text(name, style="title", height=30.0)
-        told = " · ".join(part for part in (self._title, control, whose) if part)
-        self._draw_text(told, style="soft", height=26.0)
+        subtitle = " · ".join(part for part in (self._title, control, whose) if part)
+        self._draw_text(subtitle, style="soft", height=26.0)
         self._draw_junction()
         for plan in light.plans:
             self._draw_plan(plan)
@@ -210,10 +217,10 @@ class _Sheet:
         each = 168.0
         row = int((WIDTH - 2.0 * _EDGE) // each)
         for begin in range(0, len(stages), row):
-            for column, one in enumerate(stages[begin : begin + row]):
+            for column, stage in enumerate(stages[begin : begin + row]):
                 x = _EDGE + column * each
-                self._draw_framed(one.picture, x, self._y, SIDE)
-                for style, line, words in ((None, 16.0, one.words), ("soft", 32.0, one.detail)):
+                self._draw_framed(stage.picture, x, self._y, SIDE)
+                for style, line, words in ((None, 16.0, stage.words), ("soft", 32.0, stage.detail)):
                     y = self._y + SIDE + line
                     self._parts.append(element("text", words, x=x, y=y, class_=style))
             self._y += SIDE + 44.0

@@ -224,9 +224,9 @@ def check(run: Path, checkpoint: Checkpoint) -> None:
     for name, expected in checkpoint.files.items():
         inside = slice_folder(run, number) / name
         path = recorded_part(run, name, number) if name in RECORDED else inside
-        found = file_digest(path) if path.is_file() else MISSING
-        if found != expected:
-            wrong = DamagedFile(path.relative_to(run).as_posix(), expected, found)
+        actual = file_digest(path) if path.is_file() else MISSING
+        if actual != expected:
+            wrong = DamagedFile(path.relative_to(run).as_posix(), expected, actual)
             raise SimulationError(str(wrong))
 
 

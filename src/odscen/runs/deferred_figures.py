@@ -72,8 +72,8 @@ def figure_of_actors(run: Path, summary: Mapping[str, Any], figure: RunFigure) -
         actors = actors_from_json((run / layout.ACTORS_FILE).read_text(encoding="utf-8"))
     counted = [actor for actor in actors if actor.depart >= first]
     data = RunData(counted, end=float(summary["sim_seconds"]))
-    found: Values = rounded(figure_values(data, [figure]))
-    return found[figure.name]
+    values: Values = rounded(figure_values(data, [figure]))
+    return values[figure.name]
 
 
 def measured_summary(run: Path) -> dict[str, Any]:
@@ -104,7 +104,7 @@ def measured_summary(run: Path) -> dict[str, Any]:
         text = (run / layout.ACTORS_FILE).read_text(encoding="utf-8")
         compute_figures(run, summary, actors_from_json(text))
         summary["files"] = found_files(run)
-        _to_disk(run)
+        _sync_tables(run)
         unseal_interrupted(run)  # first: this process may be killed in between
         write_whole(run / layout.SUMMARY_FILE, summary_to_json(summary))
         seal_run(run)
@@ -132,7 +132,7 @@ def whole_summary(run: Path, *, leave: Collection[str] = ()) -> dict[str, Any]:
     return measured_summary(run) if summary.get(RECORDS_ONLY) else summary
 
 
-def _to_disk(run: Path) -> None:
+def _sync_tables(run: Path) -> None:
     """Bring the tables to the disk before the summary says that they are there."""
     if (run / layout.FIGURES_FILE).is_file():
         to_disk(run / layout.FIGURES_FILE)

@@ -108,6 +108,7 @@ class Run:
             If they are not, and the records of the run are not whole any more.
         """
         if self.known.get(RECORDS_ONLY):
+            # A run is frozen for its users; what is known of it only becomes more.
             object.__setattr__(self, "known", measured_summary(self.folder))
         return self.known
 
@@ -310,11 +311,11 @@ class Run:
             If the run failed before it had any.
         """
         rows = events_from_json(self._read_text(layout.EVENTS_FILE))
-        said = [
+        records = [
             row._asdict() | {"values": None if row.values is None else json.dumps(row.values)}
             for row in rows
         ]
-        return _make_table(said, {**get_type_hints(Event), "values": str})
+        return _make_table(records, {**get_type_hints(Event), "values": str})
 
     def trajectories(self) -> pl.DataFrame:
         """Where everyone was, at every recorded time.
@@ -357,15 +358,15 @@ class Run:
         InputError
             If trajectories were not recorded, or more than 1 s apart.
         """
-        found = read_motion(self.folder / layout.FIGURES_FOLDER)
-        if found is None and not self.known.get("meso"):
-            found = measure_motion(self.folder)
-        if found is None:
+        findings = read_motion(self.folder / layout.FIGURES_FOLDER)
+        if findings is None and not self.known.get("meso"):
+            findings = measure_motion(self.folder)
+        if findings is None:
             raise InputError(
                 "motion cannot be checked: no trajectories were recorded, or more than 1 s apart",
                 file=str(self.folder),
             )
-        return found
+        return findings
 
     def lane_places(self) -> LanePlaces:
         """Segment, junction and movement of each SUMO lane: tables to join trajectories with.
@@ -434,13 +435,13 @@ class Run:
             If the study has none, or no trajectories were recorded.
         """
         _ = self.summary  # which has them computed
-        found = read_stations(self.folder / layout.FIGURES_FOLDER)
-        if found is None:
+        table = read_stations(self.folder / layout.FIGURES_FOLDER)
+        if table is None:
             raise InputError(
                 "the run has no stations: its study has none, or no trajectories were recorded",
                 file=str(self.folder),
             )
-        return found
+        return table
 
     def to_dict(self) -> dict[str, Any]:
         """Return the summary with the folder and absolute paths of its files."""

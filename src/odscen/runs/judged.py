@@ -80,11 +80,13 @@ def _read_bodies(folder: Path, actor: str) -> pl.DataFrame | None:
 
     files = trajectory_files(folder)
     plan = Plan.from_json((folder / layout.PLAN_FILE).read_text(encoding="utf-8"))
-    planned = next((one for one in plan.actors if one.id == actor), None)
+    planned = next(
+        (planned_actor for planned_actor in plan.actors if planned_actor.id == actor), None
+    )
     if not files or planned is None:
         return None
     table = pl.scan_parquet(files)
-    named = [one for one in table.collect_schema().names() if one in ("vehicle_id", "person_id")]
+    named = [name for name in table.collect_schema().names() if name in ("vehicle_id", "person_id")]
     if not named:
         return None
     ours = pl.any_horizontal(pl.col(name).cast(pl.String) == actor for name in named)

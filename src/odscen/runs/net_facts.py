@@ -163,7 +163,7 @@ def _giving_way(net: NetConnections) -> dict[str, list[str]]:
 
     Giving way to people does not count.
     """
-    found = {}
+    yielding_edges = {}
     rows = net.request_rows()
     for junction in net.junctions:
         links = rows[junction.id]
@@ -171,8 +171,8 @@ def _giving_way(net: NetConnections) -> dict[str, list[str]]:
         for index in sorted(driven):
             before = junction.yields.get(index, frozenset()) & driven
             if before:
-                found[links[index].via] = sorted(links[other].via for other in before)
-    return found
+                yielding_edges[links[index].via] = sorted(links[other].via for other in before)
+    return yielding_edges
 
 
 def _number_or_none(text: str | None) -> float | None:

@@ -195,9 +195,9 @@ class RunSettings:
         """
         study = scenario.study
         warm_up = study.warm_up if self.warm_up is None else self.warm_up
-        found = AnalysisTimes(warm_up, study.interval if self.interval is None else self.interval)
-        found.refuse_beyond(self.times(scenario)[0])
-        return found
+        times = AnalysisTimes(warm_up, study.interval if self.interval is None else self.interval)
+        times.refuse_beyond(self.times(scenario)[0])
+        return times
 
     def to_dict(self) -> dict[str, Any]:
         """As values that JSON can hold; the simulator only where it is not SUMO."""

@@ -76,7 +76,7 @@ def seal_run(run: Path, *, hidden: bool = False) -> None:
         known.pop(name, None)
     sums = sums_of(run, leave=_INNER, known=known)
     slices = f"{layout.SLICES_FOLDER}/"
-    kept = {name: one for name, one in sums.items() if not name.startswith(slices)}
+    kept = {name: digest for name, digest in sums.items() if not name.startswith(slices)}
     write_sums(run, kept, hidden=hidden)
 
 
@@ -90,7 +90,7 @@ def unseal_interrupted(run: Path) -> None:
     """Forget the checksums of what changes when a run goes on: undo :func:`seal_interrupted`."""
     sums = read_sums(run)
     if sums is not None:
-        write_sums(run, {name: one for name, one in sums.items() if name not in CHANGING})
+        write_sums(run, {name: digest for name, digest in sums.items() if name not in CHANGING})
 
 
 def seal_again(run: Path, *names: str) -> None:
@@ -124,7 +124,7 @@ def damaged_in(
     if sums is None:
         say_unchecked(run)
         return []
-    asked = {name: one for name, one in sums.items() if name not in leave}
+    asked = {name: digest for name, digest in sums.items() if name not in leave}
     if only is not None:
         asked = {only: sums[only]} if only in sums else {}
     wrong = damaged_files(run, asked, may_miss=[name for name in asked if _may_miss(name)])

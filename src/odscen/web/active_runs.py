@@ -310,9 +310,9 @@ class Runs:
     def known(self) -> list[KnownRun]:
         """All runs, those of this server that go on included."""
         with self._lock:
-            going = {name: one for name, one in self._active.items() if one.ended is None}
+            going = {name: run for name, run in self._active.items() if run.ended is None}
         kept = [run for run in known_runs(self._workspace) if run.name not in going]
-        maps = {name: one.scenario.map for name, one in going.items()}
+        maps = {name: run.scenario.map for name, run in going.items()}
         own = [KnownRun(name, of.name, of.sha256, live=True) for name, of in maps.items()]
         return [*kept, *own]
 

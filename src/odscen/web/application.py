@@ -95,7 +95,7 @@ def create_app(
     hosts
         Names that it answers to; ``None`` for all, which only a token makes safe.
     max_upload
-        Bytes of a request, at most.
+        Bytes of a request with a file that is not recorded traffic, at most.
     static
         Folder of the built front end.
     carla
@@ -197,7 +197,7 @@ def _schema_components(
     template = f"#/components/schemas/{{model}}{suffix}"
     schema = TypeAdapter(model).json_schema(mode=mode, ref_template=template)
     parts = schema.pop("$defs")
-    return {f"{part}{suffix}": one for part, one in {**parts, name: schema}.items()}
+    return {f"{part}{suffix}": part_schema for part, part_schema in {**parts, name: schema}.items()}
 
 
 class _BuiltPage(StaticFiles):

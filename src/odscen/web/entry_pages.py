@@ -55,11 +55,13 @@ def token_needed(*, wrong: bool, query: Sequence[tuple[str, str]] = ()) -> HTMLR
     The form leads to where one wanted to go: it has no address of its own, so that a browser keeps
     the path and what is behind the #, and ``query`` is what the address had besides.
     """
-    told = '<p class="wrong" role="alert">This is not the token of the server as it runs now.</p>'
+    refusal = (
+        '<p class="wrong" role="alert">This is not the token of the server as it runs now.</p>'
+    )
     given = [(escape(name, quote=True), escape(value, quote=True)) for name, value in query]
     kept = "".join(f'<input type="hidden" name="{key}" value="{text}">' for key, text in given)
     body = f"""<h1>This page needs the token of its server</h1>
-{told if wrong else ""}
+{refusal if wrong else ""}
 <p>Others may use this computer too, so odscen opens only for those who started it. Do one of
 these:</p>
 <ul>

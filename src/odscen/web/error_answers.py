@@ -96,7 +96,7 @@ def add_error_handlers(app: FastAPI) -> None:
     @app.exception_handler(HTTPException)
     def plain(_request: Request, error: HTTPException) -> Response:
         if isinstance(error.__cause__, OSError | MemoryError):  # a body that found no room
-            return _of_machine(error.__cause__)
+            return _answer_machine_error(error.__cause__)
         kind = _NAMES.get(error.status_code, "HttpError")
         response = error_response(error.status_code, kind, str(error.detail))
         response.headers.update(error.headers or {})
@@ -105,14 +105,14 @@ def add_error_handlers(app: FastAPI) -> None:
     @app.exception_handler(OSError)
     @app.exception_handler(MemoryError)
     def machine(_request: Request, error: OSError | MemoryError) -> Response:
-        return _of_machine(error)
+        return _answer_machine_error(error)
 
     @app.exception_handler(Exception)
     def unknown(_request: Request, error: Exception) -> Response:
         return error_response(500, "ServerFault", _FAULT.format(type(error).__name__))
 
 
-def _of_machine(error: OSError | MemoryError) -> Response:
+def _answer_machine_error(error: OSError | MemoryError) -> Response:
     """Answer with what the disk or the memory refuses, and with what can be done."""
     if isinstance(error, FileNotFoundError):
         message = f"{_name_of_file(error)} is not there any more; it was removed or is damaged"

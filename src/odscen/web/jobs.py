@@ -48,7 +48,9 @@ class Jobs:
         self._subjects: dict[str, str] = {}
         self._cancelled: set[str] = set()
 
-    def start(self, work: Callable[[ProgressCallback], JobResult], *, subject: str) -> str:
+    def start(
+        self, work: Callable[[ProgressCallback], JobResult], *, subject: str, join: bool = False
+    ) -> str:
         """Take on work that tells its progress and returns what it made.
 
         Parameters
@@ -57,6 +59,8 @@ class Jobs:
             Has to tell its progress first of all, and now and then: that is where it is cancelled.
         subject
             What it changes, in words: one job at a time does.
+        join
+            Whether a job about the same that is not done is waited for in its place.
 
         Raises
         ------
@@ -65,6 +69,8 @@ class Jobs:
         """
         with self._lock:
             other = self._subjects.get(subject)
+            if other is not None and join:
+                return other
             if other is not None:
                 raise ConflictError(
                     f"{subject} is being worked on (job {other}); wait for its end, or cancel it"
@@ -84,7 +90,7 @@ class Jobs:
             If there is no such job, or it was long ago.
         """
         with self._lock:
-            return self._known_job(name)
+            return self._require_job(name)
 
     def cancel(self, name: str) -> JobInfo:
         """Cancel a job; it is over within a second.
@@ -97,7 +103,7 @@ class Jobs:
             If it is over.
         """
         with self._lock:
-            job = self._known_job(name)
+            job = self._require_job(name)
             if job.state not in _LIVE:
                 raise ConflictError(f"{name} is {job.state}; it cannot be cancelled any more")
             self._cancelled.add(name)
@@ -109,7 +115,7 @@ class Jobs:
             self._cancelled |= {name for name, job in self._jobs.items() if job.state in _LIVE}
         self._pool.shutdown(wait=True)
 
-    def _known_job(self, name: str) -> JobInfo:
+    def _require_job(self, name: str) -> JobInfo:
         if name not in self._jobs:
             raise NotFoundError("job", name, [])
         return self._jobs[name]
@@ -148,6 +154,6 @@ class Jobs:
         with self._lock:
             self._jobs[info.id] = info
             if len(self._jobs) > _KEPT:
-                ended = [key for key, one in self._jobs.items() if one.state not in _LIVE]
+                ended = [key for key, job in self._jobs.items() if job.state not in _LIVE]
                 for key in ended[: len(self._jobs) - _KEPT]:
                     del self._jobs[key]

@@ -119,10 +119,10 @@ class KeptRuns:
     def by_age(self) -> list[str]:
         """Names of all runs, the newest last."""
         folders = self._runs.iterdir() if self._runs.is_dir() else ()
-        found = [
+        runs_by_age = [
             (file.stat().st_mtime, path.name) for path in folders if (file := _file_of_run(path))
         ]
-        return [name for _, name in sorted(found)]
+        return [name for _, name in sorted(runs_by_age)]
 
     def info(self, run: str) -> RunInfo:
         """What a run says of itself."""
@@ -177,10 +177,10 @@ class KeptRuns:
         """What a run's scenario says: a digest without its name and description, and its counts."""
         try:
             folder = self.folder(run)
-            said = json.loads(read_checked(folder, layout.SCENARIO_FILE, read_sums(folder)))
-            said.pop("name", None)
-            said.pop("description", None)
-            demand = said.get("demand", {})
+            document = json.loads(read_checked(folder, layout.SCENARIO_FILE, read_sums(folder)))
+            document.pop("name", None)
+            document.pop("description", None)
+            demand = document.get("demand", {})
             counts = sum(len(part["rows"]) for part in demand.get("counts", ()))
             clock_time = float(demand.get("clock", 0.0))
         except DamagedError as error:
@@ -189,7 +189,7 @@ class KeptRuns:
             raise NotFoundError("scenario of run", run, []) from error
         except (ValueError, RecursionError, AttributeError, KeyError, TypeError) as error:
             raise NotFoundError("scenario of run", run, []) from error
-        digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+        digest = hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()
         return RunContent(digest=digest, counts=counts, clock=clock_time)
 
     def files(self, run: str) -> list[RunFile]:

@@ -197,8 +197,8 @@ class LiveView:
             )
 
     async def _report_detectors(self) -> None:
-        now, said = self._run.live.detectors, self._detectors
-        changed = {name: on for name, on in now.items() if said.get(name) != on}
+        now, last_sent = self._run.live.detectors, self._detectors
+        changed = {name: on for name, on in now.items() if last_sent.get(name) != on}
         if changed:
             self._detectors = now
             await self._send_message(LiveDetectors(detectors=changed))

@@ -31,6 +31,9 @@ LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 COOKIE = "odscen_token"
 MAX_UPLOAD = 64 * 2**20
 """Bytes of a request with a file in it; the largest CARLA town has 3.4 million."""
+MAX_RECORDING = 8 * 2**30
+"""Bytes of a request with recorded traffic, which goes to the disk as it comes."""
+RECORDINGS = "/api/recordings"
 MAX_BODY = 4 * 2**20
 """Bytes of any other request."""
 PATIENCE = 30.0
@@ -66,11 +69,13 @@ class Guard:
         hosts: Collection[str] | None,
         token: str | None,
         max_upload: int = MAX_UPLOAD,
+        max_recording: int = MAX_RECORDING,
     ) -> None:
         self._app = app
         self._hosts = hosts
         self._token = token
         self._max_upload = max_upload
+        self._max_recording = max_recording
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer or refuse one request."""
@@ -127,6 +132,8 @@ class Guard:
     ) -> None:
         multipart = headers.get("content-type", "").startswith("multipart/form-data")
         limit = self._max_upload if multipart else min(MAX_BODY, self._max_upload)
+        if multipart and scope["path"] == RECORDINGS:
+            limit = self._max_recording
         words = f"more than {limit:,} bytes cannot be taken"
         length = headers.get("content-length", "")
         if length.isdigit() and int(length) > limit:

@@ -58,6 +58,16 @@ def test_a_program_that_is_taken_over_has_the_maps_stages_times_and_bounds(
         take_over_program(workspace, one, "99")
 
 
+def test_an_extended_light_that_is_taken_over_has_fixed_times(workspace: Workspace) -> None:
+    one = placed(workspace, scenario({"junction": JUNCTION, "control": "extended"}))
+    taken = take_over_program(workspace, one, JUNCTION)
+    (timing,) = taken.signals.junctions
+    assert timing.control == "fixed"
+    assert [(s.seconds, s.most) for s in spans(workspace, taken)] == [
+        (s.seconds, 0.0) for s in spans(workspace, one)
+    ]
+
+
 def test_another_cycle_divides_what_is_more_in_proportion_and_keeps_intergreens(
     workspace: Workspace,
 ) -> None:

@@ -153,6 +153,16 @@ def test_an_actuated_light_with_the_stages_of_the_map_comes_back_as_it_was(
     assert export_signals(workspace, back) == export_signals(workspace, one)
 
 
+@pytest.mark.parametrize("own", [{}, {"green": [18, 13], "offset": 7}])
+def test_an_extended_light_comes_back_as_it_was(
+    workspace: Workspace, tmp_path: Path, own: dict[str, object]
+) -> None:
+    one = placed(workspace, scenario({"junction": "10001", "control": "extended", **own}))
+    back = taken(workspace, one, tmp_path)
+    assert back.signals.junctions == one.signals.junctions
+    assert export_signals(workspace, back) == export_signals(workspace, one)
+
+
 def test_the_program_of_the_network_becomes_one_of_stages(workspace: Workspace) -> None:
     """Where vehicles begin before the crossings, they have a short stage of their own."""
     one = placed(workspace, scenario(None))

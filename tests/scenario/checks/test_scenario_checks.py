@@ -284,6 +284,17 @@ def test_timing_that_a_light_cannot_have_is_reported(
     assert signal_codes(*timings) == [(code, f"signals.{where}")]
 
 
+def test_a_program_of_its_own_cannot_be_extended() -> None:
+    own = {
+        "groups": [{"id": "V1", "movements": ["r1 straight"]}],
+        "stages": [{"id": "1", "protected": ["V1"], "green": 20}],
+    }
+    code = ("extended_needs_map_stages", "signals.junctions[0].control")
+    assert code in signal_codes({"junction": "X0", "control": "extended", **own})
+    assert code not in signal_codes({"junction": "X0", **own})
+    assert signal_codes({"junction": "X0", "control": "extended"}) == []
+
+
 def test_an_unknown_light_is_named_with_those_that_there_are() -> None:
     timed = scenario(actor(), signals={"junctions": [{"junction": "7"}]})
     (problem,) = check(timed, GRAPH, lights=LIGHTS)

@@ -130,11 +130,13 @@ def import_text(
         return edits.set_profile(scenario, graph, profile=own, **read_profile(text)._asdict())
     if kind == "counts":
         counted, own = read_counts(text, clock=clock), name or "counts"
-        with _by_line(scenario, kind, {own: counted.lines}):
+        with _name_lines_of_problems(scenario, kind, {own: counted.lines}):
             return edits.set_counts(scenario, graph, counts=own, rows=counted.values, **fields)
     if kind == "zones":
         zones = read_zones(text)
-        with _by_line(scenario, kind, {zone: rows.lines for zone, rows in zones.items()}):
+        with _name_lines_of_problems(
+            scenario, kind, {zone: rows.lines for zone, rows in zones.items()}
+        ):
             parts = {zone: {"segments": rows.values} for zone, rows in zones.items()}
             return put_parts(scenario, graph, "zones", parts)
     if kind == "inputs":
@@ -154,7 +156,9 @@ def import_text(
             }
             for own, row in inputs.items()
         }
-        with _by_line(scenario, kind, {own: (row.line,) for own, row in inputs.items()}):
+        with _name_lines_of_problems(
+            scenario, kind, {own: (row.line,) for own, row in inputs.items()}
+        ):
             return put_parts(scenario, graph, "inputs", parts)
     slices = read_matrix(text, clock=clock)
     whole = set(slices) == {None}
@@ -171,7 +175,9 @@ def import_text(
         }
         for own, (when, trips) in named.items()
     }
-    with _by_line(scenario, kind, {own: trips.lines for own, (_, trips) in named.items()}):
+    with _name_lines_of_problems(
+        scenario, kind, {own: trips.lines for own, (_, trips) in named.items()}
+    ):
         return put_parts(scenario, graph, "matrices", parts)
 
 
@@ -372,7 +378,9 @@ _FIELDS = {
 
 
 @contextmanager
-def _by_line(scenario: Scenario, kind: str, rows: Mapping[str, Sequence[int]]) -> Iterator[None]:
+def _name_lines_of_problems(
+    scenario: Scenario, kind: str, rows: Mapping[str, Sequence[int]]
+) -> Iterator[None]:
     """Say of problems of the parts that are being read in which line and column they stand.
 
     ``rows`` are the lines of the rows of each part; an input has one.

@@ -63,7 +63,7 @@ class StationFinder:
         if place is not None and place.edge is not None:
             return self.of_edge(place.edge, place.pos)
         if place is not None and place.point is not None:
-            return self._of_point(place.point, degrees=place.degrees, bearing=place.bearing)
+            return self._place_point(place.point, degrees=place.degrees, bearing=place.bearing)
         return self.of_name(station)
 
     def of_name(self, name: str) -> MapPlace:
@@ -208,7 +208,7 @@ class StationFinder:
         wanted = pos if pos >= 0 else float(along.max()) + pos
         return int(nodes[int(np.argmin(np.abs(along - wanted)))])
 
-    def _of_point(
+    def _place_point(
         self, point: tuple[float, float], *, degrees: bool, bearing: float | None
     ) -> MapPlace:
         x, y = point
@@ -234,10 +234,10 @@ class StationFinder:
                 f"is {distance}"
             )
         node = int(np.flatnonzero(near)[int(np.argmin(away[near]))])
-        found = self._place_by_direction(node)
-        if bearing is None and PLACE_SEPARATOR in found.place:
-            found = found._replace(note="no direction given: that of the nearest lane was taken")
-        return found
+        place = self._place_by_direction(node)
+        if bearing is None and PLACE_SEPARATOR in place.place:
+            place = place._replace(note="no direction given: that of the nearest lane was taken")
+        return place
 
     @cached_property
     def _project_station(self) -> Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:

@@ -306,7 +306,14 @@ def _put_trips(
     labels = dict.fromkeys(label for row in read.trips for label in (row.origin, row.destination))
     for label in labels:
         candidates = (label, _part_id(label), read.names.get(label, label))
-        found = next((one for one in candidates if one in zones or finder.is_segment(one)), None)
+        found = next(
+            (
+                candidate
+                for candidate in candidates
+                if candidate in zones or finder.is_segment(candidate)
+            ),
+            None,
+        )
         if found is None:
             try:
                 found = finder.of_name(label).place.split(">")[0]

@@ -168,7 +168,7 @@ class SignalEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there witho
         super().reset(seed=seed)
         del options
         self._episodes.begin(int(self.np_random.integers(2**31)) if seed is None else seed % 2**31)
-        return self._observe(), self._inform()
+        return self._make_observation(), self._make_info()
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Choose a stage, and let ``interval`` seconds go by."""
@@ -180,18 +180,18 @@ class SignalEnvironment(gymnasium.Env):  # type: ignore[misc]  # not there witho
             return self._last, 0.0, False, True, {}
         old, new = before.lights[self._row], now.lights[self._row]
         reward = self._reward(self.facts, old, new)
-        return self._observe(), reward, False, False, self._inform()
+        return self._make_observation(), reward, False, False, self._make_info()
 
     def close(self) -> None:
         """End the run."""
         self._episodes.close()
 
-    def _observe(self) -> Array:
+    def _make_observation(self) -> Array:
         if self._episodes.seen is not None:
             self._last = light_view(self.facts, self._episodes.seen.lights[self._row])
         return self._last
 
-    def _inform(self) -> dict[str, Any]:
+    def _make_info(self) -> dict[str, Any]:
         seen = self._episodes.seen
         if seen is None:
             return {}
@@ -256,7 +256,7 @@ class SignalsEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
         del options
         self._episodes.begin(self._episodes.scenario.seed if seed is None else seed % 2**31)
         self.agents = [*self.possible_agents]
-        return self._observe(), {name: {} for name in self.agents}
+        return self._make_observation(), {name: {} for name in self.agents}
 
     def step(
         self, actions: Mapping[str, Any]
@@ -286,7 +286,7 @@ class SignalsEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
             }
         self.agents = [] if over else [*names]
         return (
-            self._observe(),
+            self._make_observation(),
             rewards,
             dict.fromkeys(names, False),
             dict.fromkeys(names, over),
@@ -298,7 +298,7 @@ class SignalsEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
         self._episodes.close()
         self.agents = []
 
-    def _observe(self) -> dict[str, Array]:
+    def _make_observation(self) -> dict[str, Array]:
         seen = self._episodes.seen
         if seen is not None:
             self._last = {

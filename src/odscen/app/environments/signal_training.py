@@ -96,26 +96,26 @@ def train_signals(
     SimulationError
         If a run fails.
     """
-    given = [given_scenario(scenario) for scenario in scenarios]
-    if not given or episodes < 1 or batch < 1:
+    documents = [given_scenario(scenario) for scenario in scenarios]
+    if not documents or episodes < 1 or batch < 1:
         raise InputError("training needs a scenario, an episode and a batch of one at least")
     worth = named_reward(reward)
     rng = stream(seed, "signal agent")
     learner = PpoLearner(rng, updates=-(-episodes // batch), settings=ppo)
     waiting: list[LightEpisode] = []
     for number in range(episodes):
-        scenario, own = given[number % len(given)], FIRST_SEED + 1000 * seed + number
-        lights = _play_episode(workspace, scenario, own, learner, worth, settings)
+        scenario, run_seed = documents[number % len(documents)], FIRST_SEED + 1000 * seed + number
+        lights = _play_episode(workspace, scenario, run_seed, learner, worth, settings)
         waiting += lights
         if told is not None:
             mean = float(np.mean([light.rewards.mean() for light in lights]))
-            told(TrainedEpisode(number, scenario.name, own, mean))
+            told(TrainedEpisode(number, scenario.name, run_seed, mean))
         if (number + 1) % batch == 0 or number + 1 == episodes:
             learner.learn(waiting)
             waiting = []
     about = {
-        "scenarios": [scenario.name for scenario in given],
-        "maps": sorted({scenario.map.name for scenario in given}),
+        "scenarios": [scenario.name for scenario in documents],
+        "maps": sorted({scenario.map.name for scenario in documents}),
         "episodes": episodes,
         "batch": batch,
         "seed": seed,
@@ -142,14 +142,15 @@ def _play_episode(
     before: LightsObservation | None = None
     try:
         while (seen := run.see()) is not None:
+            # What a choice was worth is known when the next one is due.
             if before is not None:
-                for n, (old, new) in enumerate(zip(before.lights, seen.lights, strict=True)):
-                    rewards[n].append(worth(facts[n], old, new))
+                for number, (old, new) in enumerate(zip(before.lights, seen.lights, strict=True)):
+                    rewards[number].append(worth(facts[number], old, new))
             chosen = []
-            for n, light in enumerate(seen.lights):
-                features = stage_features(facts[n], light)
+            for number, light in enumerate(seen.lights):
+                features = stage_features(facts[number], light)
                 stage, logp = learner.draw(features) if light.may_switch else (KEEP, 0.0)
-                rows[n].append((features, light.may_switch, max(stage, 0), logp))
+                rows[number].append((features, light.may_switch, max(stage, 0), logp))
                 chosen.append(stage)
             run.switch(chosen)
             before = seen
@@ -157,14 +158,14 @@ def _play_episode(
         run.close()
     return [
         LightEpisode(
-            np.stack([row[0] for row in own[: len(got)]]),
-            np.array([row[1] for row in own[: len(got)]], dtype=np.bool_),
-            np.array([row[2] for row in own[: len(got)]], dtype=np.int64),
-            np.array([row[3] for row in own[: len(got)]], dtype=np.float64),
-            np.array(got, dtype=np.float64),
+            np.stack([row[0] for row in light_rows[: len(light_rewards)]]),
+            np.array([row[1] for row in light_rows[: len(light_rewards)]], dtype=np.bool_),
+            np.array([row[2] for row in light_rows[: len(light_rewards)]], dtype=np.int64),
+            np.array([row[3] for row in light_rows[: len(light_rewards)]], dtype=np.float64),
+            np.array(light_rewards, dtype=np.float64),
         )
-        for own, got in zip(rows, rewards, strict=True)
-        if got
+        for light_rows, light_rewards in zip(rows, rewards, strict=True)
+        if light_rewards
     ]
 
 

@@ -167,8 +167,10 @@ class HeldRun:
         self._thread.join()
         if self._failure is not None:
             return self._failure
-        said = "it ended before its first step" if self._run is None else self._run.summary["error"]
-        return SimulationError(str(said or "it ended before its first step"))
+        reason = (
+            "it ended before its first step" if self._run is None else self._run.summary["error"]
+        )
+        return SimulationError(str(reason or "it ended before its first step"))
 
 
 class SteppedRun(HeldRun):

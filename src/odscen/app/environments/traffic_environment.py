@@ -139,16 +139,16 @@ class TrafficEnvironment(pettingzoo.ParallelEnv):  # type: ignore[misc]  # as of
             gone = [name for name in rows if name not in set(now)]
             given = self._reward(self._seen, self._run.scene)
             rewards = dict(zip(now, map(float, given), strict=True))
-        told = [*now, *gone]
+        vehicles = [*now, *gone]
         views = {} if self._seen is None else self._observe_agents(self._seen)
         over = self._seen is None
         self.agents = now
         return (
-            {name: views.get(name, last.get(name)) for name in told},  # type: ignore[misc]
-            {name: rewards.get(name, 0.0) for name in told},
-            {name: name in gone and not over for name in told},
-            dict.fromkeys(told, over),
-            {name: {} for name in told},
+            {name: views.get(name, last.get(name)) for name in vehicles},  # type: ignore[misc]
+            {name: rewards.get(name, 0.0) for name in vehicles},
+            {name: name in gone and not over for name in vehicles},
+            dict.fromkeys(vehicles, over),
+            {name: {} for name in vehicles},
         )
 
     def close(self) -> None:

@@ -155,7 +155,7 @@ def _looks_lognormal(values: Sequence[float]) -> bool:
 def _student_reach(values: Sequence[float]) -> Callable[[int], float]:
     """From the mean to an end of the interval, of so many runs that scatter like these."""
     scatter = statistics.stdev(values)
-    return lambda count: _quantile(count) * scatter / math.sqrt(count)
+    return lambda count: _compute_quantile(count) * scatter / math.sqrt(count)
 
 
 def _cox_reach(values: Sequence[float]) -> Callable[[int], float]:
@@ -166,14 +166,14 @@ def _cox_reach(values: Sequence[float]) -> Callable[[int], float]:
 
     def reach(count: int) -> float:
         error = math.sqrt(spread / count + spread * spread / (2.0 * (count - 1)))
-        high = middle + _quantile(count) * error
+        high = middle + _compute_quantile(count) * error
         highest = math.exp(high) if high < _LARGEST else math.inf
         return max(highest - mean, mean - math.exp(2.0 * middle - high))
 
     return reach
 
 
-def _quantile(count: int) -> float:
+def _compute_quantile(count: int) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(count - 1, 1.0 - _TAIL))

@@ -72,7 +72,8 @@ def _repair_files(
     with run_lock(run):
         try:
             done = [
-                _rebuild_file(workspace, run, damaged_file) for damaged_file in _in_order(damaged)
+                _rebuild_file(workspace, run, damaged_file)
+                for damaged_file in _order_for_repair(damaged)
             ]
             if left := _list_damage(run):
                 raise InputError(f"still: {listed(left)}")
@@ -84,7 +85,7 @@ def _repair_files(
     return replace(step, action="rebuilt", words=f"{step.words}; {'; '.join(done)}")
 
 
-def _in_order(damaged: Sequence[DamagedFile]) -> list[DamagedFile]:
+def _order_for_repair(damaged: Sequence[DamagedFile]) -> list[DamagedFile]:
     """The list of checksums first, as others are compared with it; the report last."""
     if any(damaged_file.file == SUMS_FILE for damaged_file in damaged):
         return [damaged_file for damaged_file in damaged if damaged_file.file == SUMS_FILE]
@@ -200,5 +201,5 @@ def _set_file_aside(run: Path, name: str) -> str:
     """Set a file aside that nothing is computed from."""
     place = set_aside(run / name, run.parent)
     sums = read_sums(run) or {}
-    write_sums(run, {key: one for key, one in sums.items() if key != name})
+    write_sums(run, {key: digest for key, digest in sums.items() if key != name})
     return f"set {name} aside: {place}"

@@ -141,7 +141,7 @@ class RunWitnesses:
                 keep=None if sheet is None else sheet.take,
             )
         )  # fmt: skip
-        show.views.append(self._above_ego)
+        show.views.append(self._place_camera)
         if sheet is not None:
             show.hooks.append(sheet.ticked)
 
@@ -158,14 +158,14 @@ class RunWitnesses:
     def _sense_from_ego(self, sensors: SensorRecording, _step: Step) -> None:
         """Have the sensors on the ego while it is there."""
         shown, driven = self._mirrored.mirror.actors, self._mirrored.ego
-        found = [shown[row] for row in shown if self._plan.actors[row].ego]
-        ego = driven.hero if driven is not None else next(iter(found), None)
+        egos = [shown[row] for row in shown if self._plan.actors[row].ego]
+        ego = driven.hero if driven is not None else next(iter(egos), None)
         if ego is not None and not sensors.attached:
             sensors.attach(ego)
         elif ego is None and sensors.attached:
             sensors.detach()
 
-    def _above_ego(self, shown: Step) -> dict[int, ActorPlace]:
+    def _place_camera(self, shown: Step) -> dict[int, ActorPlace]:
         """Where the camera is to be in a tick that shows this."""
         places = self._camera_places(shown)
         if self._sheet is not None:

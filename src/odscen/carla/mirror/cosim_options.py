@@ -93,8 +93,8 @@ class CosimOptions:
             If options contradict each other, or pictures cannot be made.
         """
         if self.follow and (self.tick is not None or self.sensed_speed):
-            one = "a tick" if self.tick is not None else "sensed speed"
-            raise InputError(f"{one} cannot be set where another client makes the ticks")
+            option = "a tick" if self.tick is not None else "sensed speed"
+            raise InputError(f"{option} cannot be set where another client makes the ticks")
         if self.pictures.any or self.on_picture:
             self.pictures.check()
 

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from odscen.simulators.assets import Assets
 
 _BODIES = ("vehicle.", "walker.")
-_LEVEL = 20.0
+_HEIGHT_MARGIN = 20.0
 """Metres below the lowest and above the highest lane beyond which nobody is in the traffic."""
-_STILL = 0.01
+_LEAST_SPEED = 0.01
 """m/s below which an actor reports no speed: without physics all do, and displacement tells it."""
 
 
@@ -77,7 +77,7 @@ class ForeignActors:
         heights: tuple[float, float],
         left_out: int | None = None,
     ) -> None:
-        self._lowest, self._highest = heights[0] - _LEVEL, heights[1] + _LEVEL
+        self._lowest, self._highest = heights[0] - _HEIGHT_MARGIN, heights[1] + _HEIGHT_MARGIN
         self.seen: dict[int, tuple[str, str]] = {}
         self._server = server
         self._offset = net_offset
@@ -101,7 +101,7 @@ class ForeignActors:
         ours = self._server.ours
         there = [actor for actor in snapshot if actor.id not in ours]
         fresh = [actor.id for actor in there if actor.id not in self._known]
-        if fresh:
+        if fresh:  # what an actor is never changes, so it is asked for once
             self._register_fresh(fresh)
         now = float(snapshot.timestamp.elapsed_seconds)
         passed = now - self._time if self._time is not None else 0.0
@@ -124,13 +124,13 @@ class ForeignActors:
             if not actor.type_id.startswith(_BODIES) or role.startswith(ROLE):
                 continue
             if self._roles.has(role):
-                kind = self._kind_of(actor)
+                kind = self._find_kind(actor)
                 self._known[actor.id] = _KnownActor(
                     actor.type_id, role, kind, self._server.shape(actor.id)
                 )
                 self.seen[actor.id] = actor.type_id, role
 
-    def _kind_of(self, actor: Any) -> str:
+    def _find_kind(self, actor: Any) -> str:
         model = self._assets.blueprints.get(actor.type_id)
         category = category_of(actor.type_id, actor.attributes) if model is None else model.category
         return KINDS[Category(category)].vclass
@@ -149,7 +149,7 @@ class ForeignActors:
         )
         vx, vy = velocity.x, velocity.y
         place, last = (where.x, where.y), self._last.get(actor.id)
-        if math.hypot(vx, vy) < _STILL and last is not None and passed > 0.0:
+        if math.hypot(vx, vy) < _LEAST_SPEED and last is not None and passed > 0.0:
             vx, vy = (place[0] - last[0]) / passed, (place[1] - last[1]) / passed
         yaw = math.radians(turn.yaw)
         speed = max(0.0, vx * math.cos(yaw) + vy * math.sin(yaw))

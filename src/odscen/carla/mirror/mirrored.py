@@ -217,8 +217,8 @@ class Mirror:
     def _centre_of_interest(self, step: Step) -> tuple[float, float] | None:
         if self._ego is None:
             return None
-        found = np.flatnonzero(step.index == self._ego)
-        return (float(step.x[found[0]]), float(step.y[found[0]])) if len(found) else None
+        ego_rows = np.flatnonzero(step.index == self._ego)
+        return (float(step.x[ego_rows[0]]), float(step.y[ego_rows[0]])) if len(ego_rows) else None
 
     def _plan_batch(self, step: Step, here: np.ndarray, *, whole: bool) -> Batch:
         """Plan one tick; who comes and who goes does so when the step is ``whole``."""
@@ -229,7 +229,7 @@ class Mirror:
             self._flags.pop(row, None)
         places, velocities = self._actor_places(step, here)
         speeds = step.speed[here].tolist()
-        flags = self._all_flags(step.signals[here])
+        flags = self._convert_flags(step.signals[here])
         moves, shines, spawns, asked = [], [], [], []
         for number, row in enumerate(rows):
             actor, walks = self._actor.get(row), bool(self._walks[row])
@@ -299,7 +299,7 @@ class Mirror:
             [Velocity(*values) for values in velocity.tolist()],
         )
 
-    def _all_flags(self, signals: np.ndarray) -> list[int]:
+    def _convert_flags(self, signals: np.ndarray) -> list[int]:
         hazard = signals & VehicleSignal.BLINKER_EMERGENCY
         flags = np.full(len(signals), self._lights)
         flags += BRAKE * ((signals & VehicleSignal.BRAKE) > 0)
@@ -412,15 +412,15 @@ class Doors:
 
     def _doors_of_stopped(self, step: Step) -> dict[int, int]:
         bits = step.signals & (_LEFT | _RIGHT)
-        found = np.flatnonzero((bits > 0) & self._able[step.index])
-        return {int(step.index[k]): int(bits[k]) for k in found.tolist()}
+        stopped_rows = np.flatnonzero((bits > 0) & self._able[step.index])
+        return {int(step.index[k]): int(bits[k]) for k in stopped_rows.tolist()}
 
     def _rows_near_ego(self, step: Step) -> set[int]:
         """Rows of those near the ego."""
-        found = [] if self._ego is None else np.flatnonzero(step.index == self._ego).tolist()
-        if not found or not self._at_stop:
+        ego_rows = [] if self._ego is None else np.flatnonzero(step.index == self._ego).tolist()
+        if not ego_rows or not self._at_stop:
             return set()
-        away = np.hypot(step.x - step.x[found[0]], step.y - step.y[found[0]])
+        away = np.hypot(step.x - step.x[ego_rows[0]], step.y - step.y[ego_rows[0]])
         return set(step.index[away <= NEAR].tolist())
 
 

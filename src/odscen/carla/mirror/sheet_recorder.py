@@ -90,7 +90,7 @@ class SheetRecorder:
         ticks = tuple(self._ticks)
         while self._waiting and ticks and self._waiting[0].time < ticks[-1].elapsed + _SAME:
             picture = self._waiting.popleft()
-            near = min(ticks, key=lambda one: abs(one.elapsed - picture.time))
+            near = min(ticks, key=lambda tick: abs(tick.elapsed - picture.time))
             if abs(near.elapsed - picture.time) < _SAME:
                 self._keep_picture(near, picture)
 
@@ -119,8 +119,8 @@ class SheetRecorder:
                 tick.x + self._span / 2, tick.y + tall / 2,
             ),
             poses=np.column_stack([shown.x, shown.y, shown.hdg]),
-            sizes=np.array([(one.length, one.width) for one in actors]).reshape(-1, 2),
-            categories=tuple(str(one.category) for one in actors),
+            sizes=np.array([(actor.length, actor.width) for actor in actors]).reshape(-1, 2),
+            categories=tuple(str(actor.category) for actor in actors),
             ids=tuple(shown.ids.tolist()),
             jpeg=kept.jpeg,
         )  # fmt: skip

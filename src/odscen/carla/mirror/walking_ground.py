@@ -157,8 +157,8 @@ class WalkingGround:
         if self._surface is None:
             self._surface = self._make_surface()
             self._raised = np.zeros(len(self._surface.kinds))
-        found = self._surface.at(x, y, near, self._raised)
-        return found._replace(z=np.where(found.kind == NOWHERE, near, found.z))
+        surface = self._surface.at(x, y, near, self._raised)
+        return surface._replace(z=np.where(surface.kind == NOWHERE, near, surface.z))
 
     def _usual_heights(self, kind: IntArray) -> FloatArray:
         """What the server has last said of lanes of each kind."""

@@ -77,10 +77,10 @@ class Wheels:
 
     def _nearest_vehicles(self, shown: Step, actors: Mapping[int, int]) -> list[int]:
         """Positions in a step of the vehicles whose wheels are turned, the nearest first."""
-        found = [] if self._ego is None else np.flatnonzero(shown.index == self._ego).tolist()
-        if not found or not self._most:
+        ego_rows = [] if self._ego is None else np.flatnonzero(shown.index == self._ego).tolist()
+        if not ego_rows or not self._most:
             return []
-        [ego] = found
+        [ego] = ego_rows
         away = np.hypot(shown.x - shown.x[ego], shown.y - shown.y[ego])
         away[self._radius[shown.index] == 0.0] = np.inf
         order = np.argsort(away, kind="stable")

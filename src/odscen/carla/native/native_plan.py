@@ -104,7 +104,9 @@ def native_actors(scenario: Scenario, graph: MapGraph, plan: Plan) -> tuple[Nati
             make = _plan_walker if user.person else _plan_driver
             kind = kind_of(user, scenario.drivers, scenario.seed)
             planned_actor = make(row, user, planned, graph, nodes)
-            actors.append(replace(planned_actor, gap=_following_distance(kind, user.category)))
+            actors.append(
+                replace(planned_actor, gap=_compute_following_distance(kind, user.category))
+            )
     return tuple(actors)
 
 
@@ -124,16 +126,16 @@ def _plan_driver(
 ) -> NativeActor:
     lanes = graph.lanes
     pose = XodrPose(planned.x, planned.y, planned.z, planned.hdg, float(lanes.pitch[user.spawn]))
-    beyond = _nodes_after_goal(lanes, int(nodes[-1]))
+    beyond = _extend_beyond_goal(lanes, int(nodes[-1]))
     longer = np.concatenate([nodes, beyond])
     return _make_actor(
         row,
         user,
         pose,
-        _node_points(lanes, nodes),
-        _wanted_speeds(user, planned, lanes.speed_limit[nodes]),
-        path=_node_points(lanes, longer[_junction_marks(lanes, longer)]),
-        changes=_lane_changes(lanes, nodes),
+        _stack_node_points(lanes, nodes),
+        _compute_wanted_speeds(user, planned, lanes.speed_limit[nodes]),
+        path=_stack_node_points(lanes, longer[_find_junction_marks(lanes, longer)]),
+        changes=_find_lane_changes(lanes, nodes),
     )
 
 
@@ -164,7 +166,7 @@ def _make_actor(
     )
 
 
-def _wanted_speeds(user: RoadUser, planned: PlannedActor, limit: FloatArray) -> FloatArray:
+def _compute_wanted_speeds(user: RoadUser, planned: PlannedActor, limit: FloatArray) -> FloatArray:
     """Speed wanted under each limit; the rule of :func:`odscen.sumo.realize.driving.driver`."""
     known = np.where(np.isfinite(limit), limit, UNKNOWN_LIMIT)
     most = KINDS[user.category].max_speed if user.speed is None else user.speed
@@ -172,7 +174,7 @@ def _wanted_speeds(user: RoadUser, planned: PlannedActor, limit: FloatArray) -> 
     return wanted
 
 
-def _following_distance(kind: DriverKind, category: Category) -> float:
+def _compute_following_distance(kind: DriverKind, category: Category) -> float:
     """Metres for ``distance_to_leading_vehicle``: the driver's gap and some of its headway."""
     style = STYLES[kind.style]
     share = TWO_WHEELER_MIN_GAP if category in (Category.MOTORCYCLE, Category.BICYCLE) else 1.0
@@ -180,25 +182,26 @@ def _following_distance(kind: DriverKind, category: Category) -> float:
     return round(gap * kind.drawn.get("tau", style.headway * HEADWAY), 2)
 
 
-def _node_points(lanes: LaneGraph, nodes: Int32Array) -> FloatArray:
+def _stack_node_points(lanes: LaneGraph, nodes: Int32Array) -> FloatArray:
     return np.column_stack([lanes.x[nodes], lanes.y[nodes], lanes.z[nodes]])
 
 
-def _lane_changes(lanes: LaneGraph, nodes: Int32Array) -> tuple[tuple[int, bool], ...]:
+def _find_lane_changes(lanes: LaneGraph, nodes: Int32Array) -> tuple[tuple[int, bool], ...]:
     here, there = nodes[:-1], nodes[1:]
     left = lanes.left_lane[here] == lanes.lane[there]
     right = lanes.right_lane[here] == lanes.lane[there]
     return tuple((int(k), bool(right[k])) for k in np.flatnonzero(left | right))
 
 
-def _junction_marks(lanes: LaneGraph, nodes: Int32Array) -> list[int]:
+def _find_junction_marks(lanes: LaneGraph, nodes: Int32Array) -> list[int]:
     """Indices of the nodes a little beyond each junction that the route leaves."""
     inside = np.array([lanes.lanes.junctions[row] is not None for row in lanes.lane[nodes]])
-    turns = {k for k, _ in _lane_changes(lanes, nodes)}
+    turns = {k for k, _ in _find_lane_changes(lanes, nodes)}
     marks = []
     for k in np.flatnonzero(inside[:-1] & ~inside[1:]).tolist():
         mark = k + 1
         gone = 0.0
+        # Not past the next change of lane or junction, where the path has a choice of its own.
         while (
             gone < BEYOND and mark + 1 < len(nodes) and not inside[mark + 1] and mark not in turns
         ):
@@ -209,7 +212,7 @@ def _junction_marks(lanes: LaneGraph, nodes: Int32Array) -> list[int]:
     return marks
 
 
-def _nodes_after_goal(lanes: LaneGraph, goal: int) -> Int32Array:
+def _extend_beyond_goal(lanes: LaneGraph, goal: int) -> Int32Array:
     """Nodes after the goal, straight on as far as there are any, for :data:`AHEAD` metres."""
     nodes: list[int] = []
     gone, node = 0.0, goal
@@ -219,6 +222,7 @@ def _nodes_after_goal(lanes: LaneGraph, goal: int) -> Int32Array:
         edges = edges[lanes.relation[edges] == Relation.SUCCESSOR]
         if not len(edges):
             break
+        # At least something, so that a circle of edges without length has an end.
         gone += max(float(lanes.length[edges[0]]), 0.1)
         node = int(lanes.target[edges[0]])
         nodes.append(node)

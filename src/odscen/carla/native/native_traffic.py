@@ -363,13 +363,13 @@ class Traffic:
         """
         snapshot = self._server.world.get_snapshot()
         rows, seen = [], {}
-        for row, one in self._underway.items():
-            state = snapshot.find(one.number)
+        for row, underway in self._underway.items():
+            state = snapshot.find(underway.number)
             if state is None:
                 continue
             pose = seen[row] = _pose_of_state(state)
             speed = _ground_speed(state, pose)
-            if one.plan.person or not self._physics:
+            if underway.plan.person or not self._physics:
                 # The walker AI, and the Traffic Manager without physics, put road users where
                 # they are to be: at no velocity.
                 last = self._seen.get(row, pose)

@@ -65,7 +65,9 @@ def usual_car(server: Server) -> str:
         If the server has none.
     """
     described = server.describe(("vehicle.",))
-    cars = [name for name, said in described.items() if said.get("number_of_wheels") == "4"]
+    cars = [
+        name for name, attributes in described.items() if attributes.get("number_of_wheels") == "4"
+    ]
     known = [name for name in cars if name == "vehicle.tesla.model3"]
     return _first_name(known or sorted(cars), "car")
 

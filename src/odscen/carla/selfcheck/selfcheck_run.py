@@ -331,7 +331,7 @@ def _run_all_checks(
     )
     lines: list[CheckLine] = []
     for k, (names, check) in enumerate(checks):
-        why = _why_not(interrupted, lines, names)
+        why = _explain_skipping(interrupted, lines, names)
         if why:
             lines += [unchecked(name, "-", why) for name in names]
             continue
@@ -341,7 +341,9 @@ def _run_all_checks(
     return lines
 
 
-def _why_not(interrupted: threading.Event, lines: Sequence[CheckLine], names: Sequence[str]) -> str:
+def _explain_skipping(
+    interrupted: threading.Event, lines: Sequence[CheckLine], names: Sequence[str]
+) -> str:
     """Why a check makes no sense any more; empty if it does."""
     if interrupted.is_set():
         return "interrupted"

@@ -108,9 +108,7 @@ class PartCalls:
     def _look_up(self, world: Any, actors: Iterable[int]) -> None:
         unknown = [actor for actor in actors if actor not in self._vehicles]
         if unknown:
-            self._vehicles.update(
-                {get_actor.id: get_actor for get_actor in world.get_actors(unknown)}
-            )
+            self._vehicles.update({actor.id: actor for actor in world.get_actors(unknown)})
 
     def forget(self, actors: Iterable[int]) -> None:
         """Forget vehicles that are gone."""

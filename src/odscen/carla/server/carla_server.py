@@ -83,12 +83,12 @@ class Server(BorrowedServer):
         """Nearest place on the centre line of a driving lane or a sidewalk, as the file has it."""
         kinds = self._carla.LaneType
         with self._expect_answer():
-            found = self._world.get_map().get_waypoint(
+            waypoint = self._world.get_map().get_waypoint(
                 self._carla.Location(*at[:3]),
                 project_to_road=True,
                 lane_type=kinds.Sidewalk if sidewalk else kinds.Driving,
             )
-        return None if found is None else _actor_place(found.transform)
+        return None if waypoint is None else _actor_place(waypoint.transform)
 
     # ------------------------------------------------------------------------------- the world
     def spectator_place(self) -> ActorPlace:
@@ -195,7 +195,7 @@ class Server(BorrowedServer):
             return None
         with self._expect_answer():
             try:
-                found = self._world.ground_projection(self._carla.Location(x, y, z), reach)
+                hit = self._world.ground_projection(self._carla.Location(x, y, z), reach)
             except RuntimeError as error:
                 if "time-out" in str(error):
                     raise
@@ -205,17 +205,17 @@ class Server(BorrowedServer):
                     "vehicles are put on the surface of the map's file"
                 )
                 return None
-        if found is None or not self.release.is_ground(found.label):
+        if hit is None or not self.release.is_ground(hit.label):
             return None
-        return float(found.location.z)
+        return float(hit.location.z)
 
     # ------------------------------------------------------------------------------- the ego
     def find_role(self, *role_names: str) -> int | None:
         """Vehicle that has the first role that any has; of several, the one with the least id."""
         with self._expect_answer():
             vehicles = self._world.get_actors().filter("vehicle.*")
-            found = sorted((v.attributes.get("role_name"), v.id) for v in vehicles)
-        return next((number for name in role_names for role, number in found if role == name), None)
+            roles = sorted((v.attributes.get("role_name"), v.id) for v in vehicles)
+        return next((number for name in role_names for role, number in roles if role == name), None)
 
     def spawn_free(self, blueprint: str, role_name: str, at: ActorPlace) -> int:
         """Make a vehicle that has physics and that another program is to drive.
@@ -244,10 +244,10 @@ class Server(BorrowedServer):
         CarlaError
             If it is gone.
         """
-        found = self._world.get_snapshot().find(actor)
-        if found is None:
+        actor_snapshot = self._world.get_snapshot().find(actor)
+        if actor_snapshot is None:
             raise CarlaError(f"actor {actor} is gone from the CARLA server at {self.address}")
-        return _actor_place(found.get_transform())
+        return _actor_place(actor_snapshot.get_transform())
 
     def speed(self, actor: int, at: ActorPlace) -> float:
         """m/s ahead of an actor that is at a place, 0 if it goes backwards."""

@@ -239,10 +239,10 @@ class RecordingProxy:
             for frame, (_, number, *_rest) in frames.feed(data):
                 name = names.pop(number, "")
                 self._note_frame(connection, FrameKind.ANSWER, name, number, frame)
-                writer.write(self._through_here(frame) if name in _TOKENS else frame)
+                writer.write(self._redirect_stream(frame) if name in _TOKENS else frame)
             await writer.drain()
 
-    def _through_here(self, frame: bytes) -> bytes:
+    def _redirect_stream(self, frame: bytes) -> bytes:
         """An answer with its token changed, so that the stream it leads to comes through here."""
         at = len(frame) - _TOKEN.size  # it is the last value of both answers
         if not frame[:at].endswith(_TOKEN_MARK):
@@ -310,12 +310,12 @@ class _Frames:
 
 def _host_in_address(kind: int, address: bytes) -> str | None:
     if kind == _IPV4:
-        found = ipaddress.ip_address(address[:4])
+        host = ipaddress.ip_address(address[:4])
     elif kind == _IPV6:
-        found = ipaddress.ip_address(address)
+        host = ipaddress.ip_address(address)
     else:
         return None
-    return None if found.is_unspecified else str(found)
+    return None if host.is_unspecified else str(host)
 
 
 def _send_at_once(*writers: asyncio.StreamWriter) -> None:

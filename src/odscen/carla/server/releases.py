@@ -133,8 +133,8 @@ def release_number(words: str) -> str | None:
 
     Those that are built from source say 0.9.16-dirty or 0.9.16-12-g0123abc; some say a hash only.
     """
-    found = _NUMBER.match(words)
-    return found[0] if found else None
+    match = _NUMBER.match(words)
+    return match[0] if match else None
 
 
 def release_of(words: str) -> ReleaseAdapter:

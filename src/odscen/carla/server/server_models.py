@@ -53,19 +53,22 @@ class ServerModels(AssetSource):
 
 
 def _describe_model(
-    name: str, said: dict[str, str], known: Blueprint | None, extent: tuple[float, float, float]
+    name: str,
+    attributes: dict[str, str],
+    known: Blueprint | None,
+    extent: tuple[float, float, float],
 ) -> Blueprint:
     length, width, height = (round(2 * half, 4) for half in extent)
-    generation: Any = said.get("generation")
+    generation: Any = attributes.get("generation")
     if known is not None:
         category, age = known.category, known.age
     else:
-        category, age = category_of(name, said), None
+        category, age = category_of(name, attributes), None
     return Blueprint(
         id=name,
         category=category,
-        base_type=said.get("base_type", ""),
-        special_type=said.get("special_type", ""),
+        base_type=attributes.get("base_type", ""),
+        special_type=attributes.get("special_type", ""),
         generation=int(generation) if generation and category is not Category.PEDESTRIAN else None,
         age=age,
         body=Body(length, width, height),
@@ -73,11 +76,11 @@ def _describe_model(
     )
 
 
-def category_of(name: str, said: Mapping[str, str]) -> Category:
+def category_of(name: str, attributes: Mapping[str, str]) -> Category:
     """Category of a blueprint from what the server says of it."""
     if name.startswith("walker."):
         return Category.PEDESTRIAN
-    base_type = said.get("base_type", "").lower()
+    base_type = attributes.get("base_type", "").lower()
     if base_type in set(Category):
         return Category(base_type)
-    return Category.MOTORCYCLE if said.get("number_of_wheels") == "2" else Category.CAR
+    return Category.MOTORCYCLE if attributes.get("number_of_wheels") == "2" else Category.CAR

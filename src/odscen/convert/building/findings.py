@@ -177,7 +177,7 @@ def _find_lane_entries(odr: OpenDrive, table: RoadTable, lanes: LaneTable) -> It
                 where = "" if odr.roads[key.road].junction is None else " of a connecting road"
                 why = "it begins or ends at lanes that are closed to motor vehicles"
                 if key not in cut_off:
-                    why = _why_uncovered(odr, table, row, whole=gap >= length)
+                    why = _explain_uncovered(odr, table, row, whole=gap >= length)
                 reason = f"{gap:.2f} of {length:.2f} m{where} have no SUMO lane: {why}"
                 outcome = ElementOutcome.KEPT if why == WALKING_AREA else ElementOutcome.LOST
                 yield ReportEntry(outcome, _describe_place(*key), reason)
@@ -201,7 +201,7 @@ def _find_one_sided_links(odr: OpenDrive) -> Iterator[ReportEntry]:
         yield ReportEntry(ElementOutcome.REPAIRED, _describe_place(*here), reason)
 
 
-def _why_uncovered(odr: OpenDrive, table: RoadTable, row: int, *, whole: bool) -> str:
+def _explain_uncovered(odr: OpenDrive, table: RoadTable, row: int, *, whole: bool) -> str:
     """Why a lane, or a part of it, has no SUMO lane."""
     key = table.lane_keys[row]
     lane = odr.roads[key.road].sections[key.section].lanes[key.lane]

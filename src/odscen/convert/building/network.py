@@ -356,8 +356,8 @@ class _NetworkBuilder:
             for controller in odr.controllers.values()
             for signal, _ in controller.controls
         }
-        self._starting = _by_value(nodes.starts)
-        self._ending = _by_value(nodes.ends)
+        self._starting = _positions_by_value(nodes.starts)
+        self._ending = _positions_by_value(nodes.ends)
         self._walked: dict[str, list[SumoLaneId]] = {}
         for walk in walks.lanes:
             self._walked.setdefault(walk.edge.end, []).append(walk.edge.lanes[0].id)
@@ -651,7 +651,7 @@ class _NetworkBuilder:
         ]
 
 
-def _by_value(values: Sequence[str]) -> dict[str, list[int]]:
+def _positions_by_value(values: Sequence[str]) -> dict[str, list[int]]:
     """Positions of each value."""
     found: dict[str, list[int]] = {}
     for position, value in enumerate(values):

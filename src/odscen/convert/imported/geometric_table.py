@@ -93,7 +93,7 @@ def chains_of(net: ImportedNet, stubs: Container[SumoLaneId]) -> list[InnerChain
         after.setdefault(link.source, []).append(link.via or link.target)
         if function == NORMAL and link.source not in stubs:
             starts.append(link.source)
-    found: list[InnerChain] = []
+    chains: list[InnerChain] = []
     for start in dict.fromkeys(starts):
         open_paths: list[tuple[SumoLaneId, ...]] = [(lane,) for lane in reversed(after[start])]
         for _ in range(MOST_PATHS):
@@ -102,11 +102,11 @@ def chains_of(net: ImportedNet, stubs: Container[SumoLaneId]) -> list[InnerChain
             path = open_paths.pop()
             last = path[-1]
             if last not in stubs and net.function(last) == NORMAL:
-                found.append(InnerChain(start, path[:-1], last))
+                chains.append(InnerChain(start, path[:-1], last))
             elif len(path) < MOST_LINKS:
                 further = [lane for lane in after.get(last, ()) if lane not in path]
                 open_paths += [(*path, lane) for lane in reversed(further)]
-    return found
+    return chains
 
 
 class PathStretch(NamedTuple):
@@ -336,7 +336,7 @@ class _TableBuilder:
                 for lane in self._lanes
             ]
         )
-        found: list[MappingInterval] = []
+        intervals: list[MappingInterval] = []
         for kind in range(len(_TYPES)):
             rows = np.flatnonzero(kinds == kind)
             eligible = np.flatnonzero((self._kinds == kind) & self._long)
@@ -355,8 +355,8 @@ class _TableBuilder:
             made = intervals_of(
                 places, matched, chosen, self._roads, sumo_rows=rows, lengths=lengths
             )
-            found += [interval._replace(lane=int(eligible[interval.lane])) for interval in made]
-        return found
+            intervals += [interval._replace(lane=int(eligible[interval.lane])) for interval in made]
+        return intervals
 
     def _map_internal_lanes(self, normal: Sequence[MappingInterval]) -> list[MappingInterval]:
         """Intervals of lanes inside junctions, with measured deviations."""
@@ -365,12 +365,12 @@ class _TableBuilder:
         for interval in normal:
             firsts.setdefault(interval.sumo, interval)
             lasts[interval.sumo] = interval
-        found: dict[tuple[int, int, float, float], MappingInterval] = {}
+        intervals: dict[tuple[int, int, float, float], MappingInterval] = {}
         for chain in chains_of(self._net, self._stubs):
             for interval in self._map_chain(chain, firsts, lasts):
                 key = interval.lane, interval.sumo, float(interval.s[0]), float(interval.s[-1])
-                found.setdefault(key, interval)
-        return self._measure_intervals(list(found.values()))
+                intervals.setdefault(key, interval)
+        return self._measure_intervals(list(intervals.values()))
 
     def _map_chain(
         self,

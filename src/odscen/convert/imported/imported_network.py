@@ -196,7 +196,7 @@ def imported_network(
         # A map that was made of a network may have that network's coordinates, whatever its
         # netOffset; of a grid some lanes lie on others wherever it is put, so that the most counts.
         other = geometric_table(read_network(net_xml, offset=offset), odr, table, walks)
-        if _placed_length(other) > _placed_length(lanes):
+        if _sum_placed_lengths(other) > _sum_placed_lengths(lanes):
             lanes = other
     fidelity = verify(net_xml, odr, table, offset=lanes.net_offset)
     found, figures = import_findings(odr, table, lanes, fidelity)
@@ -212,7 +212,7 @@ def _other_offsets(offset: tuple[float, float], odr: OpenDrive) -> tuple[tuple[f
     return tuple(other for other in dict.fromkeys((moved, (0.0, 0.0))) if other != offset)
 
 
-def _own_lengths(lanes: LaneTable) -> dict[int, float]:
+def _list_placeable_lengths(lanes: LaneTable) -> dict[int, float]:
     """Lengths in metres of SUMO's lanes outside junctions that a map can have, by their rows."""
     return {
         row: lane.length
@@ -222,9 +222,9 @@ def _own_lengths(lanes: LaneTable) -> dict[int, float]:
     }
 
 
-def _placed_length(lanes: LaneTable) -> float:
+def _sum_placed_lengths(lanes: LaneTable) -> float:
     """Metres of these lanes that lie on lanes of the map."""
-    own = _own_lengths(lanes)
+    own = _list_placeable_lengths(lanes)
     return sum(
         float(interval.pos[-1] - interval.pos[0])
         for interval in lanes.intervals
@@ -235,8 +235,8 @@ def _placed_length(lanes: LaneTable) -> float:
 def _refuse_stranger(figures: Mapping[str, float], lanes: LaneTable) -> None:
     length = sum(figures.get(f"driving_{where}_length", 0.0) for where in ("road", "junction"))
     covered = sum(figures.get(f"driving_{where}_covered", 0.0) for where in ("road", "junction"))
-    own = _own_lengths(lanes)
-    placed = _placed_length(lanes)
+    own = _list_placeable_lengths(lanes)
+    placed = _sum_placed_lengths(lanes)
     if covered < LEAST_COVERED * length or placed < LEAST_PLACED * sum(own.values()):
         x, y = lanes.net_offset
         raise InputError(

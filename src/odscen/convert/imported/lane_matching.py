@@ -263,15 +263,17 @@ def match(
     base = np.maximum(nearest, 0)
     owner = lanes.owner[base]
     rows = lanes.rows[owner]
-    rate = _s_per_metre(lanes)[base]
-    s = lanes.s[base] + _distance_along(places.xyz, lanes.xyz[base], lanes.hdg[base]) * rate
+    rate = _compute_s_per_metre(lanes)[base]
+    s = lanes.s[base] + _measure_along(places.xyz, lanes.xyz[base], lanes.hdg[base]) * rate
     low, high = table.lane_s0[rows], table.lane_s1[rows]
     deviation = np.zeros(count)
+    # On a curve the point beside a place is not where the tangent has it: the second step corrects
+    # the first one.
     for _ in range(2):
         s = np.clip(s, low, high)
         xyz, hdg = middle_points(table, rows, s, roadside=lanes.roadside[owner])
         hdg = hdg + np.where(table.lane_forward[rows], 0.0, np.pi)
-        ahead = _distance_along(places.xyz, xyz, hdg)
+        ahead = _measure_along(places.xyz, xyz, hdg)
         delta = places.xyz - xyz
         deviation = np.hypot(delta[:, 0], delta[:, 1])
         s = s + ahead * rate
@@ -298,11 +300,11 @@ class _NearestLane:
 
     def nearest(self, xyz: FloatArray, hdg: FloatArray) -> IntArray:
         """Index of the best sample for each place, -1 for none."""
-        found = [
+        nearest_samples = [
             self._nearest_of_some(xyz[start : start + _AT_ONCE], hdg[start : start + _AT_ONCE])
             for start in range(0, len(xyz), _AT_ONCE)
         ]
-        return np.concatenate(found)
+        return np.concatenate(nearest_samples)
 
     def _nearest_of_some(self, xyz: FloatArray, hdg: FloatArray) -> IntArray:
         lanes = self._lanes
@@ -335,13 +337,13 @@ class _NearestLane:
         return np.maximum(past, 0.0)
 
 
-def _distance_along(places: FloatArray, origin: FloatArray, hdg: FloatArray) -> FloatArray:
+def _measure_along(places: FloatArray, origin: FloatArray, hdg: FloatArray) -> FloatArray:
     delta = places - origin
     along: FloatArray = delta[:, 0] * np.cos(hdg) + delta[:, 1] * np.sin(hdg)
     return along
 
 
-def _s_per_metre(lanes: LaneSamples) -> FloatArray:
+def _compute_s_per_metre(lanes: LaneSamples) -> FloatArray:
     """Change of s per metre in driving direction, at each sample."""
     ds, da = np.diff(lanes.s), np.diff(lanes.arc)
     joints = lanes.first[1:-1] - 1
@@ -380,7 +382,7 @@ def intervals_of(
             _LaneRun(lane, pos[a:b], found.s[part][a:b], found.deviation[part][a:b])
             for lane, a, b in runs
         ]
-        own = _without_tips(_extend_runs_to_ends(own, lanes, table), lanes)
+        own = _drop_tips(_extend_runs_to_ends(own, lanes, table), lanes)
         for run in own:
             interval = MappingInterval(run.lane, int(row), run.pos, run.s, run.deviation)
             kept = monotone(interval, growing=_s_grows_along(run, lanes, table))
@@ -427,8 +429,8 @@ def _extend_runs_to_ends(
     made = list(runs)
     for i in range(len(made) - 1):
         one, two = made[i], made[i + 1]
-        _, exit_s = _run_ends(one, lanes, table)
-        entry_s, _ = _run_ends(two, lanes, table)
+        _, exit_s = _find_run_ends(one, lanes, table)
+        entry_s, _ = _find_run_ends(two, lanes, table)
         rest, start = abs(exit_s - one.s[-1]), abs(entry_s - two.s[0])
         step = two.pos[0] - one.pos[-1]
         if rest + start > 3.0 * step + 0.5 or step <= 0:
@@ -450,7 +452,7 @@ def _extend_runs_to_ends(
     return made
 
 
-def _without_tips(runs: list[_LaneRun], lanes: LaneSamples) -> list[_LaneRun]:
+def _drop_tips(runs: list[_LaneRun], lanes: LaneSamples) -> list[_LaneRun]:
     """Drop what a SUMO lane touches of the lanes before and after its own at its very ends.
 
     Roads overlap a little where they meet; a run that covers most of a short lane stays.
@@ -473,7 +475,7 @@ def _s_grows_along(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> bool:
     return bool(table.lane_forward[lanes.rows[run.lane]])
 
 
-def _run_ends(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> tuple[float, float]:
+def _find_run_ends(run: _LaneRun, lanes: LaneSamples, table: RoadTable) -> tuple[float, float]:
     """Values of s at which a run would enter and leave its lane."""
     row = int(lanes.rows[run.lane])
     low, high = float(table.lane_s0[row]), float(table.lane_s1[row])

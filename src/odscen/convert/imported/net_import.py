@@ -286,7 +286,7 @@ def _permitted_classes(classes: frozenset[str]) -> frozenset[str] | None:
 
 def _import_links(net: Any, lanes: dict[SumoLaneId, ImportedLane]) -> tuple[ImportedLink, ...]:
     """All connections, by lane in the order of the file."""
-    found = []
+    links = []
     for edge in net.getEdges(withInternal=True):
         for lane in edge.getLanes():
             for link in lane.getOutgoing():
@@ -298,13 +298,13 @@ def _import_links(net: Any, lanes: dict[SumoLaneId, ImportedLane]) -> tuple[Impo
                 places = link.getTLLinkIndex(), link.getTLLinkIndex2()
                 letters = tuple(place for place in places if place >= 0)
                 ends = SumoLaneId(source), SumoLaneId(target)
-                found.append(ImportedLink(*ends, via, light, letters))
-    return tuple(found)
+                links.append(ImportedLink(*ends, via, light, letters))
+    return tuple(links)
 
 
 def _import_rights(net: Any, controlled: Container[SumoLaneId]) -> tuple[ImportedRights, ...]:
     """Right of way of the junctions that lanes with lights lead to."""
-    found = []
+    rights = []
     for node in net.getNodes():
         incoming = tuple(SumoLaneId(lane) for lane in node._incLanes or ())
         if any(lane in controlled for lane in incoming):
@@ -314,8 +314,8 @@ def _import_rights(net: Any, controlled: Container[SumoLaneId]) -> tuple[Importe
             requests = (
                 Request(_parse_bits(node._prohibits[n]), _parse_bits(node._foes[n])) for n in rows
             )
-            found.append(ImportedRights(str(node.getID()), incoming, tuple(requests)))
-    return tuple(found)
+            rights.append(ImportedRights(str(node.getID()), incoming, tuple(requests)))
+    return tuple(rights)
 
 
 def _parse_bits(text: str) -> frozenset[int]:

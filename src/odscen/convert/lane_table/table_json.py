@@ -26,7 +26,7 @@ _DIGITS = 4
 
 def table_to_json(table: LaneTable) -> str:
     """One JSON document; the same table gives the same text."""
-    return json.dumps(_to_data(table), separators=(",", ":"), allow_nan=False)
+    return json.dumps(_table_to_data(table), separators=(",", ":"), allow_nan=False)
 
 
 def table_from_json(text: str | bytes) -> LaneTable:
@@ -41,12 +41,12 @@ def table_from_json(text: str | bytes) -> LaneTable:
     try:
         data = read_json(text, what=what)
         with documents(what):
-            return _from_data(data)
+            return _table_from_data(data)
     except InputError as error:
         raise GraphFormatError(error.problem) from error
 
 
-def _to_data(table: LaneTable) -> dict[str, Any]:
+def _table_to_data(table: LaneTable) -> dict[str, Any]:
     """Columns of a table, ready for JSON."""
     classes = _Classes()
     lanes = table.lane_list
@@ -108,8 +108,8 @@ def _to_data(table: LaneTable) -> dict[str, Any]:
     }
 
 
-def _from_data(data: dict[str, Any]) -> LaneTable:
-    """Inverse of :func:`_to_data`."""
+def _table_from_data(data: dict[str, Any]) -> LaneTable:
+    """Inverse of :func:`_table_to_data`."""
     if data["version"] != VERSION:
         raise ValueError(f"version {data['version']!r}, not {VERSION}")
     edge_ids = [SumoEdgeId(edge) for edge in data["edges"]["id"]]

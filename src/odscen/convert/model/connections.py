@@ -89,12 +89,12 @@ def find_connections(
     Lanes that are ``folded`` (:func:`odscen.opendrive.topology.folded_lanes`) are passed over.
     """
     finder = _ConnectionFinder(table, successors, edges, sides)
-    found: list[PlannedConnection] = []
+    planned_connections: list[PlannedConnection] = []
     for number, edge in enumerate(edges):
         for index in range(len(edge.lanes)):
-            found += finder.connections_from(number, index)
-    found, overlaps = _without_folds(table, edges, found, folded)
-    plans, connections = _with_room(edges, found, overlaps)
+            planned_connections += finder.connections_from(number, index)
+    planned_connections, overlaps = _without_folds(table, edges, planned_connections, folded)
+    plans, connections = _with_room(edges, planned_connections, overlaps)
     return PlannedConnections(plans, connections, tuple(finder.lost))
 
 

@@ -102,19 +102,19 @@ def merge_gaps(
 
 def _merge_gaps(road: Road, gaps: list[RoadGap]) -> tuple[RoadGap, ...]:
     """Gaps of a road, widened to junctions that are near, and joined if they are close."""
-    found: list[RoadGap] = []
+    road_gaps: list[RoadGap] = []
     for gap in gaps:
         # At a dead end a stub stays: without an edge there no vehicle would come over the gap.
         start = max(gap.start, 0.0 if road.predecessor else min(STUB, 0.1 * road.length))
         end = min(gap.end, road.length - (0.0 if road.successor else min(STUB, 0.1 * road.length)))
         before, behind = start, road.length - end
-        if before < min(TO_JUNCTION, behind) and _at_junction(road, "start"):
+        if before < min(TO_JUNCTION, behind) and _ends_at_junction(road, "start"):
             start = 0.0
-        if behind < min(TO_JUNCTION, before) and _at_junction(road, "end"):
+        if behind < min(TO_JUNCTION, before) and _ends_at_junction(road, "end"):
             end = road.length
-        found.append(RoadGap(start, end, gap.at))
+        road_gaps.append(RoadGap(start, end, gap.at))
     groups: list[list[RoadGap]] = []
-    for gap in found:
+    for gap in road_gaps:
         if groups and gap.start - max(group.end for group in groups[-1]) < BETWEEN:
             groups[-1].append(gap)
         else:
@@ -153,13 +153,13 @@ def _joined_gaps(road: Road, gaps: list[RoadGap]) -> list[RoadGap]:
 
 def is_between_junctions(road: Road) -> bool:
     """Whether a road leads from one junction to another one."""
-    both = _at_junction(road, "start") and _at_junction(road, "end")
+    both = _ends_at_junction(road, "start") and _ends_at_junction(road, "end")
     if not both or road.predecessor is None or road.successor is None:
         return False
     return road.predecessor.element_id != road.successor.element_id
 
 
-def _at_junction(road: Road, end: str) -> bool:
+def _ends_at_junction(road: Road, end: str) -> bool:
     link = road.predecessor if end == "start" else road.successor
     return link is not None and link.element_type == "junction"
 

@@ -281,12 +281,12 @@ class Net:
         beyond = {
             of_edge[link.source][link.source_lane].id: link.via for link in self.links if link.via
         }
-        found: dict[SumoLaneId, LinkPath] = {}
+        paths: dict[SumoLaneId, LinkPath] = {}
         for first in (lanes[link.via] for link in self.links if link.via):
             second = beyond.get(first.id)
             if second is None:
-                found[first.id] = LinkPath(first.shape, first.speed, None)
+                paths[first.id] = LinkPath(first.shape, first.speed, None)
             else:
                 shape = np.concatenate([first.shape, lanes[second].shape[1:]])
-                found[first.id] = LinkPath(shape, first.speed, first.length)
-        return found
+                paths[first.id] = LinkPath(shape, first.speed, first.length)
+        return paths

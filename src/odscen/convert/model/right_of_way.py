@@ -169,7 +169,7 @@ def _meeting_kind(
     if one.source[0] == other.source[0] or one.target[0] == other.target[0]:
         return "cross" if _truly_cross(line, line2) else ""
     reach = min(MOST_WIDTH, WIDTH_SHARE * (one.width + other.width))
-    if line.distance(line2) >= reach or not _on_one_level(one.shape, other.shape):
+    if line.distance(line2) >= reach or not _are_on_one_level(one.shape, other.shape):
         return ""
     return "cross"
 
@@ -184,7 +184,7 @@ def _truly_cross(one: shapely.LineString, other: shapely.LineString) -> bool:
     return not rest.is_empty
 
 
-def _on_one_level(one: FloatArray, other: FloatArray) -> bool:
+def _are_on_one_level(one: FloatArray, other: FloatArray) -> bool:
     low = max(float(one[:, 2].min()), float(other[:, 2].min()))
     high = min(float(one[:, 2].max()), float(other[:, 2].max()))
     return low - high < LEVEL
@@ -197,7 +197,7 @@ def _crossed_movements(
     return tuple(
         index
         for index, (movement, line) in enumerate(zip(movements, lines, strict=True))
-        if area.distance(line) < WALKER_REACH and _on_one_level(walkway.axis, movement.shape)
+        if area.distance(line) < WALKER_REACH and _are_on_one_level(walkway.axis, movement.shape)
     )
 
 
@@ -259,7 +259,7 @@ def in_turn(
     """
     return frozenset(
         (i, j)
-        for i, j in _of_equal_right(movements, conflicts, rules)
+        for i, j in _find_equal_pairs(movements, conflicts, rules)
         if _has_lane_beside(movements, i) == _has_lane_beside(movements, j)
     )
 
@@ -275,7 +275,7 @@ def making_room(
     next merge, lock for good. There drivers of the motorway make room, as they do in reality.
     """
     pairs = []
-    for i, j in _of_equal_right(movements, conflicts, rules):
+    for i, j in _find_equal_pairs(movements, conflicts, rules):
         if _has_lane_beside(movements, i) != _has_lane_beside(movements, j):
             main, ramp = (i, j) if _has_lane_beside(movements, i) else (j, i)
             pairs.append((ramp, main) if _is_two_way(movements, main) else (main, ramp))
@@ -286,14 +286,15 @@ def _is_two_way(movements: Sequence[Movement], number: int) -> bool:
     """Whether traffic comes the opposite way on the same carriageway: no median is between."""
     main = movements[number]
     s, c = math.sin(main.heading_in), math.cos(main.heading_in)
-    own = [one for one in movements if one.source[0] == main.source[0]]
+    own = [movement for movement in movements if movement.source[0] == main.source[0]]
     return any(
         abs(wrapped(other.heading_in - main.heading_in)) > OPPOSING
         # Where one drives in, the other one comes out.
-        and abs((y - one.shape[0, 1]) * c - (x - one.shape[0, 0]) * s) - one.width < _MEDIAN
+        and abs((y - movement.shape[0, 1]) * c - (x - movement.shape[0, 0]) * s) - movement.width
+        < _MEDIAN
         for other in movements
         for x, y in (other.shape[-1, :2].tolist(),)
-        for one in own
+        for movement in own
     )
 
 
@@ -309,7 +310,7 @@ def _has_lane_beside(movements: Sequence[Movement], number: int) -> bool:
     )
 
 
-def _of_equal_right(
+def _find_equal_pairs(
     movements: Sequence[Movement], conflicts: Conflicts, rules: Rules
 ) -> frozenset[tuple[int, int]]:
     """Pairs of movements that merge where nothing else meets and nothing says who goes first."""

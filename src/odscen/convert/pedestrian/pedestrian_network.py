@@ -336,7 +336,7 @@ class _WalkNetBuilder:
                 counts[node.junction] += 1
             return node.edge
 
-        found: dict[str, list[PlacedCrossing]] = {}
+        crossings: dict[str, list[PlacedCrossing]] = {}
         order = sorted(
             range(len(self._crosswalks)),
             key=lambda n: (self._junctions[n], str(self._ends[n, 0]), n),
@@ -344,7 +344,7 @@ class _WalkNetBuilder:
         for number in order:
             placed, junction = self._crosswalks[number], self._junctions[number]
             start, end = area(self._ends[number, 0]), area(self._ends[number, 1])
-            own = found.setdefault(junction, [])
+            own = crossings.setdefault(junction, [])
             edge = crossing_id(junction, len(own))
             crosswalk = placed.crosswalk
             axis = np.column_stack((crosswalk.axis, np.full(2, crosswalk.z)))
@@ -370,7 +370,7 @@ class _WalkNetBuilder:
         for key, node in self._nodes.items():
             if len(node.edges) > 1:
                 area(key)
-        return found
+        return crossings
 
     def _build_areas(
         self, crossings: dict[str, list[PlacedCrossing]]

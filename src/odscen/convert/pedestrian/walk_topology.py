@@ -187,7 +187,7 @@ class _Divider:
             f"{placed.crosswalk.road}:{placed.crosswalk.object_id}": number
             for number, placed in enumerate(self._crosswalks)
         }
-        found: dict[int, list[_CrosswalkEnd]] = {}
+        crosswalk_ends: dict[int, list[_CrosswalkEnd]] = {}
         for edge in np.flatnonzero(graph.kind == WalkKind.CROSSWALK).tolist():
             number = index[graph.crosswalk[edge]]
             axis = self._crosswalks[number].crosswalk.axis
@@ -197,8 +197,8 @@ class _Divider:
             swapped = np.linalg.norm(places[::-1] - axis, axis=1).sum()
             for which, node in enumerate(nodes if straight <= swapped else nodes[::-1]):
                 end = _CrosswalkEnd(float(graph.s[node]), number, which)
-                found.setdefault(int(graph.lane[node]), []).append(end)
-        return {walk: sorted(ends) for walk, ends in found.items()}
+                crosswalk_ends.setdefault(int(graph.lane[node]), []).append(end)
+        return {walk: sorted(ends) for walk, ends in crosswalk_ends.items()}
 
     def _divide_walks(self, clusters: Mapping[NodeKey, NodeKey]) -> list[Arc]:
         """Divide the walks at the ends of crosswalks."""

@@ -151,12 +151,12 @@ def _ruled_places(
 ) -> dict[str, _RuledPlace]:
     """What lies under the links that lights control, by SUMO junction."""
     programs = {program.tl for program in net.programs}
-    found: dict[str, _RuledPlace] = {}
+    places: dict[str, _RuledPlace] = {}
     for name, links in net.request_rows().items():
         ruled = [link for link in links if link.tl in programs]
         if not ruled:
             continue
-        place = found[name] = _RuledPlace()
+        place = places[name] = _RuledPlace()
         over = _roads_under(net, [link.via for link in ruled if link.via], drivable, keys)
         for counts in over:
             place.roads.update(counts)
@@ -164,7 +164,7 @@ def _ruled_places(
             place.junctions.update(junction for junction in inside if junction is not None)
         for counts in _roads_under(net, _lanes_around(ruled), drivable, keys):
             place.roads.update(road for road, _ in counts.most_common(1))
-    return found
+    return places
 
 
 def _lanes_around(links: Sequence[NetFileLink]) -> list[str]:

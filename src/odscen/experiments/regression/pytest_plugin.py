@@ -169,10 +169,10 @@ def _run_scenario(
     if not named and configured:
         named = (config.inipath or config.rootpath / "-").parent / configured
     store = Workspace.open(Path(named) if named else None)
-    return runs.run(store, _beside_test(config, Path(scenario)), settings=settings, out=out)
+    return runs.run(store, _resolve_beside_test(config, Path(scenario)), settings=settings, out=out)
 
 
-def _beside_test(config: pytest.Config, scenario: Path) -> Path:
+def _resolve_beside_test(config: pytest.Config, scenario: Path) -> Path:
     """A relative path is one from the folder of the test file; from where pytest runs if not."""
     test, _, _ = os.environ.get("PYTEST_CURRENT_TEST", "").partition("::")
     near = (config.rootpath / test).parent / scenario

@@ -192,9 +192,12 @@ def _correlate_arrivals(likely: Sequence[float], lanes: Sequence[int], frame: in
         -10 * p[4],
     )
     all_of = _lane_state_counts([frame] * 3)
-    parts = [one / most for one, most in zip(_lane_state_counts(lanes), all_of, strict=True)]
+    parts = [
+        counted / most for counted, most in zip(_lane_state_counts(lanes), all_of, strict=True)
+    ]
     return [
-        one + _CORRELATION * added * part for one, added, part in zip(p, more, parts, strict=True)
+        share + _CORRELATION * added * part
+        for share, added, part in zip(p, more, parts, strict=True)
     ]
 
 

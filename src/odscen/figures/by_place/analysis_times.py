@@ -41,8 +41,8 @@ class AnalysisTimes:
 
     def to_dict(self) -> dict[str, float]:
         """Fields for ``summary.json``; none if the whole run is analysed as it was measured."""
-        said = {"warm_up": self.warm_up or None, "interval": self.interval}
-        return {name: value for name, value in said.items() if value is not None}
+        times = {"warm_up": self.warm_up or None, "interval": self.interval}
+        return {name: value for name, value in times.items() if value is not None}
 
     def refuse_beyond(self, end: float) -> None:
         """Refuse a warm-up that leaves nothing of a run of ``end`` seconds.

@@ -324,7 +324,7 @@ def _link_capacities(
                     turns.append(_Turn(begin, span[0].time, span[-1].until, number))
                 else:
                     totals[begin] += number
-        share = _as_driven(entries.get(via, nothing), turns, np.sort(starts))
+        share = _measure_driven_share(entries.get(via, nothing), turns, np.sort(starts))
         for turn in turns:
             totals[turn.interval] += share * turn.number
         found += [(via, begin, total) for begin, total in sorted(totals.items())]
@@ -332,7 +332,7 @@ def _link_capacities(
     return pl.DataFrame(sorted(found), schema=schema, orient="row")
 
 
-def _as_driven(entries: FloatArray, turns: Sequence[_Turn], starts: FloatArray) -> float:
+def _measure_driven_share(entries: FloatArray, turns: Sequence[_Turn], starts: FloatArray) -> float:
     """What greens that did not clear the queue let through, as a share of what they have room for.
 
     Parameters

@@ -80,7 +80,7 @@ def vehicle_passages(
         number, period = number * len(kept) // len(moments), period * round(1.0 / period)
     chosen = facts.drivers.filter(~pl.col("serves"))
     batches = -(-number // MOST_ROWS)
-    lanes = facts.once("known_lanes", places, lambda: _known_lanes(places, facts.limits))
+    lanes = facts.once("known_lanes", places, lambda: _number_lanes(places, facts.limits))
     found = []
     for batch in range(batches):
         own = pl.Series(range(len(chosen))) % batches == batch
@@ -120,13 +120,13 @@ def lost_time(
     ``last`` (s), and seconds lost: ``behind``, ``on_the_way``, ``before``, and ``inside``.
     ``None`` if lane or speed were not recorded.
     """
-    return _lost_on(trajectories, _known_lanes(places, limits), drivers, period=period)
+    return _lost_on(trajectories, _number_lanes(places, limits), drivers, period=period)
 
 
 def _lost_on(
     trajectories: pl.LazyFrame, lanes: pl.DataFrame, drivers: pl.DataFrame, *, period: float
 ) -> pl.DataFrame | None:
-    """The same, with lanes as :func:`_known_lanes` has them."""
+    """The same, with lanes as :func:`_number_lanes` has them."""
     import polars as pl
 
     if not set(_NEEDED) <= set(trajectories.collect_schema()):
@@ -146,7 +146,7 @@ def _lost_on(
 _MEASURED = ("begin", "last", "behind", "on_the_way", "before", "inside")
 
 
-def _known_lanes(places: LanePlaces, limits: pl.DataFrame) -> pl.DataFrame:
+def _number_lanes(places: LanePlaces, limits: pl.DataFrame) -> pl.DataFrame:
     """Each lane with its limit and its junction, numbered; ``inner`` is 0 on roads."""
     import polars as pl
 

@@ -86,9 +86,9 @@ def busiest_corridor(movements: pl.DataFrame, graph: MapGraph) -> Corridor | Non
     turns = {turn: count for turn, count in turns.items() if ahead.straight(*turn)} or turns
     onwards = transitions(graph)
     before: dict[str, set[str]] = defaultdict(set)
-    for one, others in onwards.items():
+    for segment, others in onwards.items():
         for other in others:
-            before[other].add(one)
+            before[other].add(segment)
     busiest = sorted(turns, key=lambda turn: (-turns[turn], turn))[:_TRIED]
     routes = {_grow_route(turn, turns, onwards, before) for turn in busiest}
     for _, route in sorted(routes, key=lambda found: (-found[0], found[1])):
@@ -166,10 +166,10 @@ def path_between(graph: MapGraph, first: str, last: str) -> tuple[str, ...]:
     path = _find_shortest_path(graph, first, last, None)
     if path is None:
         raise InputError(f"one cannot drive from {first} to {last}")
-    return _passed_segments(graph, path)
+    return _list_passed_segments(graph, path)
 
 
-def _passed_segments(graph: MapGraph, path: Int32Array) -> tuple[str, ...]:
+def _list_passed_segments(graph: MapGraph, path: Int32Array) -> tuple[str, ...]:
     """Segments in the order in which a path leads over them."""
     rows = graph.lanes.segment[path].tolist()
     return tuple(graph.segments.ids[row] for row, _ in itertools.groupby(rows))
@@ -190,7 +190,7 @@ def corridor_along(graph: MapGraph, segments: Sequence[str]) -> Corridor:
     names = _with_junctions(graph, named)
     mask = np.isin(graph.lanes.segment, segment_rows(graph.segments, names))
     path = _find_shortest_path(graph, names[0], names[-1], mask)
-    if path is None or list(_passed_segments(graph, path)) != names:
+    if path is None or list(_list_passed_segments(graph, path)) != names:
         raise InputError(
             f"one cannot drive along {some_of(names, most=20, between=', ')} in this order; "
             "--from and --to find a route"

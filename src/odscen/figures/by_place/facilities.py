@@ -267,7 +267,7 @@ def highway_density(
     known = facts.once("highways", places, lambda: _find_highways(places, facts))
     # A map without any has no row, and most maps are such.
     if known.is_empty():
-        return _no_density()
+        return _make_empty_densities()
     share = float(facts.drivers["heavy"].mean() or 0.0)  # type: ignore[arg-type]
     rows = parts.filter("motor").select(
         "lane", "edge", "segment", "begin", "seconds", "heavy_seconds"
@@ -291,7 +291,7 @@ def highway_density(
     )
 
 
-def _no_density() -> pl.DataFrame:
+def _make_empty_densities() -> pl.DataFrame:
     import polars as pl
 
     number = pl.Float64

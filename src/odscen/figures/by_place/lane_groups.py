@@ -165,10 +165,10 @@ def _name_groups(rows: Sequence[tuple[str, str, str]]) -> dict[str, str]:
     """Name of the group of each lane before a junction; rows of junction, lane and movement."""
     parent: dict[str, str] = {}
 
-    def root(one: str) -> str:
-        while parent.setdefault(one, one) != one:
-            one = parent[one]
-        return one
+    def root(lane: str) -> str:
+        while parent.setdefault(lane, lane) != lane:
+            lane = parent[lane]
+        return lane
 
     for _, lane, movement in rows:
         parent[root(movement)] = root(lane)

@@ -190,7 +190,7 @@ def part_sums(
         sums = _sums_of(
             _read_records(rows, own, split, positions), split, period, float(moments[-1])
         )
-        found = pl.concat([found, _by_interval(sums, split, clock)])
+        found = pl.concat([found, _split_by_interval(sums, split, clock)])
     keys = ("lane", "part", "begin")
     return found.group_by(keys).agg(pl.col(*_MEASURED, *_COUNTED).sum()).sort(keys)
 
@@ -409,7 +409,7 @@ def _sums_of(rows: _Records, split: SplitLanes, period: float, end: float) -> _P
     )
 
 
-def _by_interval(sums: _PartRows, split: SplitLanes, clock: pl.DataFrame) -> pl.DataFrame:
+def _split_by_interval(sums: _PartRows, split: SplitLanes, clock: pl.DataFrame) -> pl.DataFrame:
     import numpy as np
     import polars as pl
 

@@ -87,7 +87,7 @@ class LanePlaces:
 
     def to_json(self) -> str:
         """One JSON document, columns as lists."""
-        return _to_json(self)
+        return _write_json(self)
 
     @classmethod
     def from_json(cls, text: str) -> LanePlaces:
@@ -98,7 +98,7 @@ class LanePlaces:
         InputError
             If it is not such a document of this version.
         """
-        return _from_json(text)
+        return _read_json(text)
 
     @classmethod
     def of(cls, **tables: Iterable[Sequence[object]]) -> LanePlaces:
@@ -122,14 +122,14 @@ class LanePlaces:
 
 
 @lru_cache(maxsize=4)
-def _to_json(places: LanePlaces) -> str:
+def _write_json(places: LanePlaces) -> str:
     """One text for all runs on a map."""
     data = {"format": _FORMAT, "version": _VERSION, **places.columns}
     return json.dumps(data, separators=(",", ":"), allow_nan=False)
 
 
 @lru_cache(maxsize=4)
-def _from_json(text: str) -> LanePlaces:
+def _read_json(text: str) -> LanePlaces:
     """Runs on one map have the same text, and what follows from it is kept with the places."""
     import polars as pl
 

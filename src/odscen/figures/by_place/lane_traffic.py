@@ -83,7 +83,7 @@ def lane_traffic(
     )
     found = used
     while found.height > most and clock.height > 1:
-        clock = _by_twos(clock)
+        clock = _pair_intervals(clock)
         found = (
             used.with_columns(begins_at(used["begin"], clock))
             .group_by("begin", *keys)
@@ -100,7 +100,7 @@ def lane_traffic(
     return LaneTraffic(times, named.select(keys).rows(), named["length"].to_list(), sums)
 
 
-def _by_twos(clock: pl.DataFrame) -> pl.DataFrame:
+def _pair_intervals(clock: pl.DataFrame) -> pl.DataFrame:
     import polars as pl
 
     pairs = clock.with_row_index("pair").with_columns(pl.col("pair") // 2)

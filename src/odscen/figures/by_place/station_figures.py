@@ -128,17 +128,19 @@ def _station_reach(
             offsets = {lane: -pos}
             ahead = [(name, length[lane] - pos) for name in after.get(lane, ())]
             while ahead:
-                one, start = ahead.pop()
-                if one in length and one not in offsets and start < REACH:
-                    offsets[one] = start
-                    ahead += [(other, start + length[one]) for other in after.get(one, ())]
+                next_lane, start = ahead.pop()
+                if next_lane in length and next_lane not in offsets and start < REACH:
+                    offsets[next_lane] = start
+                    ahead += [
+                        (other, start + length[next_lane]) for other in after.get(next_lane, ())
+                    ]
             behind = [(name, -pos) for name in before.get(lane, ())]
             while behind:
-                one, end = behind.pop()
-                if one in length and one not in offsets and end > -REACH:
-                    offsets[one] = end - length[one]
-                    behind += [(other, offsets[one]) for other in before.get(one, ())]
-            found += [(line, number, one, metres) for one, metres in sorted(offsets.items())]
+                next_lane, end = behind.pop()
+                if next_lane in length and next_lane not in offsets and end > -REACH:
+                    offsets[next_lane] = end - length[next_lane]
+                    behind += [(other, offsets[next_lane]) for other in before.get(next_lane, ())]
+            found += [(line, number, lane, metres) for lane, metres in sorted(offsets.items())]
     names = {"line": pl.String, "place": pl.Int64, "lane": pl.String, "offset": pl.Float64}
     return pl.DataFrame(found, schema=names, orient="row")
 
@@ -206,7 +208,7 @@ def _figures_of_station(
     second = crossed.filter(col("line") == f"{planned_station.id} second")
     if planned_station.kind == "detector":
         share = col("covered").sum() / len(planned_station.first)
-        found = _on_clock(
+        found = _fill_intervals(
             first, clock, vehicles=pl.len(), speed=col("speed").mean(), occupied=share
         ).with_columns(occupancy=col("occupied").fill_null(0.0) / (col("end") - col("begin")))
     elif planned_station.kind == "section":
@@ -214,7 +216,7 @@ def _figures_of_station(
             first.select("id", "time", came="time").sort("time"), on="time", by="id"
         )
         took = col("time") - col("came")
-        found = _on_clock(
+        found = _fill_intervals(
             done.drop_nulls("came"),
             clock,
             vehicles=pl.len(),
@@ -222,9 +224,9 @@ def _figures_of_station(
             travel_time_p95=took.quantile(0.95, interpolation="linear"),
         )
     else:
-        out = _on_clock(second, clock, left=pl.len()).select("begin", "left")
+        out = _fill_intervals(second, clock, left=pl.len()).select("begin", "left")
         found = (
-            _on_clock(first, clock, vehicles=pl.len())
+            _fill_intervals(first, clock, vehicles=pl.len())
             .join(out, on="begin")
             .with_columns(left=col("left").fill_null(0))
             .with_columns(
@@ -239,7 +241,7 @@ def _figures_of_station(
     )
 
 
-def _on_clock(rows: pl.DataFrame, clock: pl.DataFrame, **sums: pl.Expr) -> pl.DataFrame:
+def _fill_intervals(rows: pl.DataFrame, clock: pl.DataFrame, **sums: pl.Expr) -> pl.DataFrame:
     found = (
         rows.sort("time")
         .join_asof(clock.sort("begin"), left_on="time", right_on="begin", coalesce=False)

@@ -216,14 +216,14 @@ def traffic_figures(
 
 def over_run(table: pl.DataFrame) -> pl.DataFrame:
     """One of the tables with one row for each place, over all intervals."""
-    keys, whole = _over_run(tuple(table.columns))
+    keys, whole = _sum_over_run(tuple(table.columns))
     if keys:
         return _with_rates(table.group_by(keys, maintain_order=True).agg(whole))
     return _with_rates(table.select(whole).with_columns(vehicles="departed"))
 
 
 @lru_cache(maxsize=32)
-def _over_run(columns: tuple[str, ...]) -> tuple[list[str], list[pl.Expr]]:
+def _sum_over_run(columns: tuple[str, ...]) -> tuple[list[str], list[pl.Expr]]:
     """Columns that name a place, and what the others come to over all intervals."""
     import polars as pl
 

@@ -56,7 +56,7 @@ def network_sums(lanes: pl.DataFrame, clock: pl.DataFrame, places: LanePlaces) -
     found = lanes.group_by(INTERVAL).agg(_sum_columns("departed", "arrived", *TRAFFIC, *LOST))
     length = float(places.lanes.filter("motor").unique("lane")["length"].sum())
     under_way = (pl.col("departed") - pl.col("arrived")).cum_sum().shift(1, fill_value=0)
-    return _on_clock(clock, found, INTERVAL).with_columns(
+    return _fill_grid(clock, found, INTERVAL).with_columns(
         (under_way + pl.col("departed")).alias("vehicles"), pl.lit(length / 1000.0).alias("length")
     )
 
@@ -182,10 +182,10 @@ def _fill_intervals(found: pl.DataFrame, clock: pl.DataFrame, places: pl.DataFra
     key = places.columns[0]
     seen = places.join(found, on=key, how="semi").sort(key)
     grid = seen.with_columns(pl.col("length") / 1000.0).join(clock, how="cross")
-    return _on_clock(grid, found, (key, *INTERVAL))
+    return _fill_grid(grid, found, (key, *INTERVAL))
 
 
-def _on_clock(grid: pl.DataFrame, found: pl.DataFrame, keys: Sequence[str]) -> pl.DataFrame:
+def _fill_grid(grid: pl.DataFrame, found: pl.DataFrame, keys: Sequence[str]) -> pl.DataFrame:
     """Rows of ``found`` on those of ``grid``; zeros where there are none."""
     import polars as pl
 

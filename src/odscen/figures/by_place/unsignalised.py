@@ -93,7 +93,7 @@ def unsignalised_sums(
     junctions = dict(groups.ways.select("via", "junction").rows())
     flows = _measure_flows(passed, facts, clock)
     found = []
-    for (begin, seconds), rows in _by_interval(flows, clock):
+    for (begin, seconds), rows in _flows_by_interval(flows, clock):
         driven: dict[str, dict[str, _Way]] = defaultdict(dict)
         for junction in sorted({junctions[via] for via in rows if via in ways}):
             driven[junction] = {}
@@ -107,7 +107,7 @@ def unsignalised_sums(
                 found.append((via, begin, hourly * seconds / 3600.0))
     schema = {"via": pl.String, "begin": pl.Float64, "capacity": pl.Float64}
     by_way = pl.DataFrame(found, schema=schema, orient="row").sort("via", "begin")
-    yielding = [via for via, one in ways.items() if one.facility != Facility.MAJOR.value]
+    yielding = [via for via, way in ways.items() if way.facility != Facility.MAJOR.value]
     some = groups.ways.filter(pl.col("via").is_in(yielding)).select("lane_group").unique()
     lanes = shared_lanes(by_way, passed, groups).join(some, on="lane_group", how="semi")
     seen = _queue_observations(passed, groups, clock)
@@ -139,7 +139,7 @@ def _find_unsignalised_ways(
         .join(facts.links, on="via")
         .sort("via")
     )
-    found = {}
+    ways = {}
     for row in rows.iter_rows(named=True):
         ends = str(row["movement"]).split(">")
         stream = Stream(
@@ -147,8 +147,8 @@ def _find_unsignalised_ways(
             onto=ends[-1], turn=_TURNS.get(row["turn"], THROUGH),
             yields_to=frozenset(row["yields_to"]), flow=0.0,
         )  # fmt: skip
-        found[stream.via] = _Way(stream, row["facility"], bool(row["onto_ring"]))
-    return found
+        ways[stream.via] = _Way(stream, row["facility"], bool(row["onto_ring"]))
+    return ways
 
 
 def _measure_flows(passed: pl.DataFrame, facts: NetFacts, clock: pl.DataFrame) -> pl.DataFrame:
@@ -167,7 +167,7 @@ def _measure_flows(passed: pl.DataFrame, facts: NetFacts, clock: pl.DataFrame) -
     )
 
 
-def _by_interval(
+def _flows_by_interval(
     flows: pl.DataFrame, clock: pl.DataFrame
 ) -> list[tuple[tuple[float, float], dict[str, tuple[float, float]]]]:
     """Begin and length of each interval with vehicles, and what entered, an hour, by ``via``."""
@@ -184,7 +184,7 @@ def _compute_capacities(
     """Vehicles an hour of each connection of one junction."""
     streams = [way.stream for way in ways.values()]
     found = two_way_capacities(streams)
-    stops = {via for via, one in ways.items() if one.facility == Facility.ALL_WAY_STOP.value}
+    stops = {via for via, way in ways.items() if way.facility == Facility.ALL_WAY_STOP.value}
     if stops:
         lanes = _stop_lanes([ways[via].stream for via in sorted(stops)])
         at_line = all_way_capacities(lanes, _relate_approaches(lanes, bearings))
@@ -223,7 +223,7 @@ def _stop_lanes(streams: Sequence[Stream]) -> list[StopLane]:
     of_lane: dict[str, list[Stream]] = defaultdict(list)
     for stream in streams:
         of_lane[stream.lane].append(stream)
-    found = []
+    lanes = []
     for lane, ones in sorted(of_lane.items()):
         flow = sum(stream.flow for stream in ones)
         shares = {
@@ -231,12 +231,12 @@ def _stop_lanes(streams: Sequence[Stream]) -> list[StopLane]:
             for turn in (LEFT, RIGHT)
         }
         heavy = sum(stream.flow * stream.heavy for stream in ones) / flow if flow else 0.0
-        found.append(
+        lanes.append(
             StopLane(
                 lane, ones[0].approach, flow, left=shares[LEFT], right=shares[RIGHT], heavy=heavy
             )
         )
-    return found
+    return lanes
 
 
 def _relate_approaches(lanes: Sequence[StopLane], bearings: Mapping[str, float]) -> Relations:

@@ -132,7 +132,7 @@ def _count_measure(name: str, kind: EventKind) -> Callable[[RunRecords, ActorOut
     )
 
 
-def _of_outcome(name: str) -> Callable[[RunRecords, ActorOutcome], Measured | None]:
+def _make_outcome_measure(name: str) -> Callable[[RunRecords, ActorOutcome], Measured | None]:
     def found(_: RunRecords, outcome: ActorOutcome) -> Measured | None:
         value = getattr(outcome, name)
         return None if value is None else Measured(float(value), outcome.arrived)
@@ -177,7 +177,7 @@ def _measure_impacts(
             return Measured(0.0)
         if not known:  # SUMO says of those that it has found neither speed nor place
             return None
-        return known[0] if first else max(known, key=lambda one: one.value)
+        return known[0] if first else max(known, key=lambda moment: moment.value)
 
     return found
 
@@ -230,7 +230,7 @@ def _furthest_departure(records: RunRecords, outcome: ActorOutcome) -> Measured 
     found = lane_departures(bodies, lanes)
     if not found:
         return None
-    beyond = np.array([one.beyond for one in found])
+    beyond = np.array([moment.beyond for moment in found])
     furthest = int(beyond.argmax())
     if beyond[furthest] <= 0.0:
         return Measured(0.0)
@@ -247,7 +247,9 @@ def _shortest_distance(records: RunRecords, outcome: ActorOutcome, other: str) -
         return None
     best = Measured(math.inf)
     for one, two in _bodies_at_once(own, its):
-        least = math.dist((one.x, one.y), (two.x, two.y)) - _reach(one) - _reach(two)
+        least = (
+            math.dist((one.x, one.y), (two.x, two.y)) - _measure_reach(one) - _measure_reach(two)
+        )
         if least < best.value and (away := body_distance(one, two)) < best.value:
             best = Measured(away, one.standing)
     return best if best.value < math.inf else None
@@ -277,7 +279,7 @@ def _gap_when_stopped(records: RunRecords, outcome: ActorOutcome, other: str) ->
     return best
 
 
-def _reach(body: ActorView) -> float:
+def _measure_reach(body: ActorView) -> float:
     return math.hypot(body.length, body.width) / 2.0
 
 
@@ -406,7 +408,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="Route length over travel time, of an actor that arrived.",
         source="events",
         better=Better.HIGHER,
-        compute=_of_outcome("mean_speed"),
+        compute=_make_outcome_measure("mean_speed"),
     ),
     ActorMeasure(
         name="travel_time",
@@ -415,7 +417,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="Time from insertion to arrival.",
         source="events",
         better=Better.LOWER,
-        compute=_of_outcome("travel_time"),
+        compute=_make_outcome_measure("travel_time"),
     ),
     ActorMeasure(
         name="delay",
@@ -424,7 +426,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="Time lost below the desired speed, of an actor that arrived.",
         source="SUMO tripinfo, timeLoss",
         better=Better.LOWER,
-        compute=_of_outcome("delay"),
+        compute=_make_outcome_measure("delay"),
     ),
     ActorMeasure(
         name="waiting_time",
@@ -433,7 +435,7 @@ ACTOR_MEASURES: tuple[ActorMeasure, ...] = (
         definition="Time that the actor was below 0.1 m/s.",
         source="SUMO tripinfo, waitingTime",
         better=Better.LOWER,
-        compute=_of_outcome("waiting_time"),
+        compute=_make_outcome_measure("waiting_time"),
     ),
     ActorMeasure(
         name="impact_speed",
@@ -539,8 +541,10 @@ Measure = ActorMeasure | PairMeasure | RuleMeasure
 def measure_of(name: str, about: str) -> Measure | None:
     """Measure of what is written in brackets: two ids with a comma, or the id of one or a rule."""
     if "," in about:
-        return next((one for one in PAIR_MEASURES if one.name == name), None)
-    return actor_measure(name) or next((one for one in RULE_MEASURES if one.name == name), None)
+        return next((measure for measure in PAIR_MEASURES if measure.name == name), None)
+    return actor_measure(name) or next(
+        (measure for measure in RULE_MEASURES if measure.name == name), None
+    )
 
 
 def actor_measure(name: str) -> ActorMeasure | None:

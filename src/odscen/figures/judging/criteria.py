@@ -111,14 +111,14 @@ def criteria_rows(
     """
     wanted = criteria_of(texts)
     rows = []
-    for one, verdict in zip(wanted, evaluate(wanted, summary, records), strict=True):
+    for expectation, verdict in zip(wanted, evaluate(wanted, summary, records), strict=True):
         value = verdict.value
         rows.append(
             {
-                "criterion": one.text,
-                "words": one.words,
-                "value": None if value is None else round(one.in_its_unit(value), 6),
-                "unit": one.unit,
+                "criterion": expectation.text,
+                "words": expectation.words,
+                "value": None if value is None else round(expectation.in_its_unit(value), 6),
+                "unit": expectation.unit,
                 "passed": verdict.passed,
                 "time": verdict.time,
             }

@@ -285,12 +285,14 @@ def _measure_expectation(
 ) -> Measured | None:
     measure = expectation.figure
     if expectation.actor is not None:
-        return _of_actors(expectation, cast("Measure", measure), records)
+        return _measure_actors(expectation, cast("Measure", measure), records)
     value = _value_of_figure(expectation, summary)
     return None if value is None else Measured(value, _instant_of_figure(expectation.name, records))
 
 
-def _of_actors(expectation: Expectation, measure: Measure, records: RunRecords) -> Measured | None:
+def _measure_actors(
+    expectation: Expectation, measure: Measure, records: RunRecords
+) -> Measured | None:
     """Value of the actor or rule; of several egos the one that is furthest from meeting it."""
     if isinstance(measure, RuleMeasure):
         return measure.compute(records, expectation.actor or "")

@@ -61,7 +61,7 @@ def lane_departures(bodies: pl.DataFrame, lanes: DrivenLanes) -> list[LaneDepart
     """
     places = _LanePlaces(lanes)
     current: int | None = None
-    found = []
+    departures = []
     columns = ("time", "x", "y", "hdg", "length", "width")
     for time, x, y, hdg, length, width in bodies.select(columns).iter_rows():
         corners = _find_corners(x, y, hdg, length, width)
@@ -80,8 +80,8 @@ def lane_departures(bodies: pl.DataFrame, lanes: DrivenLanes) -> list[LaneDepart
             if lane in places.family(current) or own.max() <= 0.0 or beyond.min() > 0.0:
                 current, beyond = lane, own
                 break
-        found.append(LaneDeparture(time, float(beyond.max())))
-    return found
+        departures.append(LaneDeparture(time, float(beyond.max())))
+    return departures
 
 
 def _find_corners(x: float, y: float, hdg: float, length: float, width: float) -> FloatArray:

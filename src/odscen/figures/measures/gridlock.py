@@ -73,7 +73,7 @@ def find_incidents(
     end
         When the run ended, seconds; who was to depart later is not missed.
     """
-    found = [*_on_the_road(events), *_not_inserted(plan, outcomes, end)]
+    found = [*_find_incidents_on_road(events), *_find_insertion_failures(plan, outcomes, end)]
     return tuple(sorted(found, key=_incident_order))
 
 
@@ -105,7 +105,7 @@ def incident_summary(found: Sequence[Incident]) -> dict[str, Any]:
     }
 
 
-def _on_the_road(events: Iterable[Event]) -> list[Incident]:
+def _find_incidents_on_road(events: Iterable[Event]) -> list[Incident]:
     open_jams: dict[str, Event] = {}
     found = []
     for event in events:
@@ -151,7 +151,9 @@ def _teleport_incident(event: Event) -> Incident:
     )
 
 
-def _not_inserted(plan: Plan, outcomes: Sequence[ActorOutcome], end: float) -> list[Incident]:
+def _find_insertion_failures(
+    plan: Plan, outcomes: Sequence[ActorOutcome], end: float
+) -> list[Incident]:
     groups: dict[tuple[str, str], list[PlannedActor]] = {}
     for actor, outcome in zip(plan.actors, outcomes, strict=True):
         if outcome.status is ActorStatus.WAITING and actor.depart < end:

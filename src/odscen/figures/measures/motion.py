@@ -296,7 +296,7 @@ def _check_part(
     steps = _check_steps(time, row, x, y, hdg, speed, length, walking, limits, step)
     if lanes is not None:
         recorded = rows["lane"] if "lane" in rows.columns else None
-        steps += _off_road(time, x, y, speed, walking, recorded, lanes, step)
+        steps += _find_off_road(time, x, y, speed, walking, recorded, lanes, step)
     steps += _find_overlaps(time, row, x, y, hdg, length, width, step)
     return _join_findings(steps, rows, plan, forced, lanes, step)
 
@@ -328,7 +328,7 @@ def _check_steps(
     step: float,
 ) -> list[_Step]:
     """Findings between records of one road user; arrays of shape ``(N,)``, by user and time."""
-    found: list[_Step] = []
+    steps: list[_Step] = []
     dt = np.diff(time)
     joined = (row[1:] == row[:-1]) & (dt > 1e-6) & (dt < 1.5 * step)
     now = np.flatnonzero(joined)
@@ -342,7 +342,7 @@ def _check_steps(
         at = np.flatnonzero(mask)
         if len(at):
             known = np.broadcast_to(np.asarray(bounds, dtype=np.float64), mask.shape)[at]
-            found.append(_Step(kind, later[at], values[at], known))
+            steps.append(_Step(kind, later[at], values[at], known))
 
     turned = np.mod(hdg[later] - hdg[now] + np.pi, 2.0 * np.pi) - np.pi
     middle = hdg[now] + 0.5 * turned
@@ -398,7 +398,7 @@ def _check_steps(
     ):
         at = np.flatnonzero(values > bounds + 0.05)
         if len(at):
-            found.append(_Step(kind, last[at], values[at], bounds[at]))
+            steps.append(_Step(kind, last[at], values[at], bounds[at]))
     first = np.arange(max(0, len(time) - 2 * count))
     first = first[stretch[first] == stretch[first + 2 * count]]
     mid, last = first + count, first + 2 * count
@@ -412,13 +412,13 @@ def _check_steps(
     bound = limits[1, mid]
     at = np.flatnonzero(whole & (sideways > bound + 0.1))
     if len(at):
-        found.append(_Step(MotionKind.LATERAL_ACCELERATION, mid[at], sideways[at], bound[at]))
+        steps.append(_Step(MotionKind.LATERAL_ACCELERATION, mid[at], sideways[at], bound[at]))
     jerk = np.abs((speed[last] - speed[mid]) / two - (speed[mid] - speed[first]) / one) / span
     bound = limits[4, mid]
     at = np.flatnonzero(whole & (jerk > bound + 0.1))
     if len(at):
-        found.append(_Step(MotionKind.JERK, mid[at], jerk[at], bound[at]))
-    return found
+        steps.append(_Step(MotionKind.JERK, mid[at], jerk[at], bound[at]))
+    return steps
 
 
 def _flag_rows(mask: BoolArray, rows: IntArray, count: int) -> IntArray:
@@ -435,7 +435,7 @@ def _sample_rows(time: FloatArray, step: float) -> BoolArray:
     return sampled
 
 
-def _off_road(
+def _find_off_road(
     time: FloatArray,
     x: FloatArray,
     y: FloatArray,

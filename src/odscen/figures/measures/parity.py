@@ -70,7 +70,7 @@ def parity_figures(
         "mirrored": both.height,
         "share_mirrored": round(both.height / total, 6) if total else None,
         **_position_errors(both),
-        "by_category": _by_category(both, plan),
+        "by_category": _errors_by_category(both, plan),
         "departures": _compare_departures(states, plan),
         "absent": _list_absent(states, plan),
         "lights": _compare_lights(lights),
@@ -121,7 +121,7 @@ def _percentiles_of(values: FloatArray) -> dict[str, float] | None:
     return {name: round(float(value), 6) for name, value in zip(names, found, strict=True)}
 
 
-def _by_category(both: pl.DataFrame, plan: Plan) -> dict[str, Any]:
+def _errors_by_category(both: pl.DataFrame, plan: Plan) -> dict[str, Any]:
     import polars as pl
 
     categories = pl.Series([actor.category for actor in plan.actors], dtype=pl.String)

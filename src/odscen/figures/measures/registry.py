@@ -108,13 +108,13 @@ def figure_values(
     measured on demand, and of public transport, which few scenarios have, are left out.
     """
     return {
-        figure.name: _kept_value(data, figure) if data.has(figure.basis) else None
+        figure.name: _read_kept_value(data, figure) if data.has(figure.basis) else None
         for figure in figures
         if figure.part is part and (figure.basis not in _ON_DEMAND or data.has(figure.basis))
     }
 
 
-def _kept_value(data: RunData, figure: RunFigure) -> float | int | None:
+def _read_kept_value(data: RunData, figure: RunFigure) -> float | int | None:
     if figure.name not in data.kept:
         data.kept[figure.name] = figure.compute(data)
     value: float | int | None = data.kept[figure.name]

@@ -26,12 +26,12 @@ _RATIO = Display("", digits=2)
 
 def _travel_time_ratios(run: RunData) -> pl.Series:
     if _RATIOS not in run.kept:
-        run.kept[_RATIOS] = _of_trips(run.trips)
+        run.kept[_RATIOS] = _compute_trip_ratios(run.trips)
     ratios: pl.Series = run.kept[_RATIOS]
     return ratios
 
 
-def _of_trips(trips: pl.DataFrame | None) -> pl.Series:
+def _compute_trip_ratios(trips: pl.DataFrame | None) -> pl.Series:
     import polars as pl
 
     if trips is None:

@@ -30,7 +30,7 @@ _SSM = f"{_FHWA}; SUMO's SSM device"
 _SECONDS = Display("s", digits=2)
 
 
-def _known_values(run: RunData, measure: str, *, walking: bool) -> list[float]:
+def _list_measured_values(run: RunData, measure: str, *, walking: bool) -> list[float]:
     """Values of a measure in conflicts between vehicles, or of pedestrians with them."""
     if run.conflicts is None:
         return []
@@ -43,7 +43,7 @@ def _known_values(run: RunData, measure: str, *, walking: bool) -> list[float]:
 def _least_value(
     measure: str, limit: float, *, walking: bool = False
 ) -> Callable[[RunData], float]:
-    return lambda run: min([limit, *_known_values(run, measure, walking=walking)])
+    return lambda run: min([limit, *_list_measured_values(run, measure, walking=walking)])
 
 
 def _count_serious(run: RunData) -> float | None:
@@ -52,7 +52,7 @@ def _count_serious(run: RunData) -> float | None:
     return float(run.conflicts.select(is_serious().sum()).item())
 
 
-def _of_all(values: Mapping[str, Any]) -> str:
+def _describe_total(values: Mapping[str, Any]) -> str:
     recorded = values.get("conflicts")
     return "" if recorded is None else f"of {recorded:,} recorded"
 
@@ -84,7 +84,7 @@ FIGURES = (
         section=ReportSection.CONFLICTS,
         note="DRAC, of vehicles",
         limit=SEEN_DRAC,
-        compute=lambda run: max([SEEN_DRAC, *_known_values(run, "drac", walking=False)]),
+        compute=lambda run: max([SEEN_DRAC, *_list_measured_values(run, "drac", walking=False)]),
     ),
     RunFigure(
         name="min_pet",
@@ -125,7 +125,7 @@ FIGURES = (
         basis=Basis.CONFLICTS,
         display=COUNT,
         section=ReportSection.CONFLICTS,
-        note=_of_all,
+        note=_describe_total,
         alarming=True,
         compute=_count_serious,
     ),

@@ -230,13 +230,15 @@ def _measure_use(greens: pl.DataFrame, passed: pl.DataFrame) -> pl.DataFrame:
     rows = []
     for key in sorted({*shown, *seen}):
         times, stopped = seen.get(key, ([], []))
-        rows.append((*key, len(times), *_of_greens(*shown.get(key, ([], [])), times, stopped)))
+        rows.append(
+            (*key, len(times), *_count_wasted_green(*shown.get(key, ([], [])), times, stopped))
+        )
     names = dict.fromkeys(keys, pl.String)
     numbers = {"vehicles": pl.Int64, "cycle_failures": pl.Int64, "unused_green": pl.Float64}
     return pl.DataFrame(rows, schema={**names, **numbers}, orient="row")
 
 
-def _of_greens(
+def _count_wasted_green(
     begins: Sequence[float],
     ends: Sequence[float],
     times: Sequence[float],

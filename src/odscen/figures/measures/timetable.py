@@ -65,7 +65,7 @@ def _mean_lateness(run: RunData) -> float | None:
     return None if run.visits is None else _number_or_none(lateness(run.visits)["late"].mean())
 
 
-def _on_time(run: RunData) -> float | None:
+def _compute_on_time_share(run: RunData) -> float | None:
     if run.visits is None:
         return None
     return _number_or_none((lateness(run.visits)["late"] <= LATE).mean())
@@ -123,7 +123,7 @@ FIGURES = (
         basis=Basis.STOPS,
         display=Display("%", 100.0, 1),
         section=ReportSection.TRANSIT,
-        compute=_on_time,
+        compute=_compute_on_time_share,
     ),
     RunFigure(
         name="parked_trips",

@@ -58,7 +58,7 @@ def _keep_arrived(outcomes: Outcomes) -> Outcomes:
     return [outcome for outcome in outcomes if outcome.status is ActorStatus.ARRIVED]
 
 
-def _of_mode(
+def _make_mode_figures(
     prefix: str, who: str, of: Callable[[RunData], Outcomes], *, section: ReportSection
 ) -> tuple[RunFigure, ...]:
     """Figures of vehicles or of pedestrians; ``who`` begins the label of the latter."""
@@ -146,8 +146,8 @@ def _of_mode(
 
 
 FIGURES = (
-    *_of_mode("", "", lambda run: run.vehicles, section=ReportSection.KEY_FIGURES),
-    *_of_mode(
+    *_make_mode_figures("", "", lambda run: run.vehicles, section=ReportSection.KEY_FIGURES),
+    *_make_mode_figures(
         "pedestrian_", "pedestrian ", lambda run: run.pedestrians, section=ReportSection.PEDESTRIANS
     ),
     RunFigure(

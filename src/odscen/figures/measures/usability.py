@@ -203,9 +203,9 @@ def run_usability(
     """
     found = [
         None if scene else _judge_gridlock(incidents, end, words),
-        _not_inserted(outcomes, incidents, end, words),
+        _judge_not_inserted(outcomes, incidents, end, words),
         _judge_teleports(outcomes, incidents, words),
-        None if scene else _not_served(outcomes, end),
+        None if scene else _judge_not_served(outcomes, end),
         None if scene else _judge_latent_delay(outcomes, end),
         None if until is None else _stopped_early(end, until, words),
     ]
@@ -263,7 +263,7 @@ def _judge_gridlock(
     return UsabilityReason(UsabilityKind.GRIDLOCK, level, longest, len(named), text, places)
 
 
-def _not_inserted(
+def _judge_not_inserted(
     outcomes: Sequence[ActorOutcome],
     incidents: Sequence[Incident],
     end: float,
@@ -297,7 +297,7 @@ def _judge_teleports(
     return _judge_share(UsabilityKind.TELEPORTED, len(gone), len(inserted), text, first, places)
 
 
-def _not_served(outcomes: Sequence[ActorOutcome], end: float) -> UsabilityReason | None:
+def _judge_not_served(outcomes: Sequence[ActorOutcome], end: float) -> UsabilityReason | None:
     arriving = [
         outcome
         for outcome in outcomes

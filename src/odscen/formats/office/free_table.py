@@ -384,15 +384,15 @@ class FreeTable:
     def _time_columns(self) -> list[int]:
         """Columns whose titles are slices of time."""
         reader = StampReader(self._table.titles)
-        found = []
+        columns = []
         for column, title in enumerate(self._table.titles):
             if re.fullmatch(r"\d{1,2}[:.]\d{2}.*|\d{1,2}\s*(?:-|–|bis|to)\s*\d{1,2}.*", title):
                 try:
                     reader.read(title)
                 except InputError:
                     continue
-                found.append(column)
-        return found
+                columns.append(column)
+        return columns
 
     def _read_wide(self, slices: Sequence[int]) -> TrafficFile:
         if "station" not in self._index:
@@ -489,13 +489,13 @@ class FreeTable:
 
     def _class_columns(self) -> dict[int, str]:
         """Columns of single kinds of vehicles, where none has all of them."""
-        found: dict[int, str] = {}
+        categories: dict[int, str] = {}
         for column, title in enumerate(self._table.titles):
             if column not in self._index.values():
                 for category, pattern in _CLASSES.items():
                     if re.fullmatch(pattern, normalised(title)):
-                        found[column] = category
-        return found
+                        categories[column] = category
+        return categories
 
     def _read_rows(self, classes: Mapping[int, str]) -> TrafficFile:
         table = self._table
@@ -550,9 +550,9 @@ class FreeTable:
                 "(--time-zone Europe/Berlin converts them)"
             )
         kept = (
-            self._add_lanes(self._one_day(read))
+            self._add_lanes(self._choose_day(read))
             if "number" in self._index
-            else (self._one_day(read))
+            else (self._choose_day(read))
         )
         length = self._slice_length([(name, stamp.second) for name, stamp, *_ in kept])
         volumes = []
@@ -604,7 +604,7 @@ class FreeTable:
                 value = self._read_value(row[column], line, table.titles[column])
                 if value is not None:
                     read.append((table.titles[column], stamp, stamp.end, value, line))
-        kept = self._one_day(read)
+        kept = self._choose_day(read)
         length = self._slice_length([(name, stamp.second) for name, stamp, *_ in kept])
         volumes = tuple(
             VolumeRow(
@@ -688,7 +688,7 @@ class FreeTable:
             hours_from_1=counted_from_1,
         )
 
-    def _one_day(
+    def _choose_day(
         self, read: Sequence[tuple[str, Stamp, float | None, float, int]]
     ) -> list[tuple[str, Stamp, float | None, float, int]]:
         """Rows of the day that is asked for, or of the one with most of them."""

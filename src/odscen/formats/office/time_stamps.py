@@ -143,7 +143,9 @@ class StampReader:
             raise InputError(f"{shown(cell)} is no time")
         if number >= _EPOCH:
             seconds = number / (1000.0 if number >= 1e11 else 1.0)
-            return self._in_zone(datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=seconds))
+            return self._convert_to_zone(
+                datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=seconds)
+            )
         of_day = self._unit == "h"
         number -= self._first_hour if of_day else 0
         return Stamp(None, number * SECONDS[self._unit], None, of_day=of_day)
@@ -168,9 +170,9 @@ class StampReader:
         if self._zone is None:
             self.had_offset = True
             return Stamp(day, second, None, of_day=True)
-        return self._in_zone(moment)
+        return self._convert_to_zone(moment)
 
-    def _in_zone(self, moment: datetime) -> Stamp:
+    def _convert_to_zone(self, moment: datetime) -> Stamp:
         self.had_offset = self.had_offset or self._zone is None
         local = moment if self._zone is None else moment.astimezone(self._zone)
         second = local.hour * 3600.0 + local.minute * 60.0 + local.second

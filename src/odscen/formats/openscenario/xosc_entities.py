@@ -116,13 +116,16 @@ def _write_box(facts: EntityFacts) -> _Element:
 
 def _actor_properties(actor: Actor) -> dict[str, str]:
     """Fields of the actor, those too that a position or speed says without the node's name."""
-    said = actor.model_dump(
+    fields = actor.model_dump(
         mode="json",
         exclude_defaults=True,
         exclude={"id", "category"},
     )
     kind = "ego_vehicle" if actor.ego else "simulation"
-    return {"type": kind, **{PREFIX + name: _property_text(value) for name, value in said.items()}}
+    return {
+        "type": kind,
+        **{PREFIX + name: _property_text(value) for name, value in fields.items()},
+    }
 
 
 def _property_rows(facts: EntityFacts) -> _Element:

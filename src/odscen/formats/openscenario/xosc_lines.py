@@ -56,10 +56,10 @@ def name_of_path(name: str, tracked: TrackedPoint) -> str:
 
 def tracked_point(name: str) -> TrackedPoint:
     """Inverse of :func:`name_of_path`."""
-    found = _TRACKED.search(name)
-    if found is None:
+    match = _TRACKED.search(name)
+    if match is None:
         return TrackedPoint()
-    return TrackedPoint(float(found[1]), backwards=bool(found[2]))
+    return TrackedPoint(float(match[1]), backwards=bool(match[2]))
 
 
 class ActionWriter(Protocol):
@@ -236,11 +236,11 @@ def _start_of_path(made: ActionWriter, part: Any, actor: str) -> GroundPose | No
 
 def _add_headings(spots: Sequence[GroundPose]) -> list[GroundPose]:
     """Spots with the heading of the line through them."""
-    found: list[GroundPose] = []
+    poses: list[GroundPose] = []
     for row, spot in enumerate(spots):
         before, after = spots[max(row - 1, 0)], spots[min(row + 1, len(spots) - 1)]
         dx, dy = after.x - before.x, after.y - before.y
-        hdg = found[-1].hdg if found else spot.hdg  # who stands at a place keeps looking there
+        hdg = poses[-1].hdg if poses else spot.hdg  # who stands at a place keeps looking there
         hdg = math.atan2(dy, dx) if math.hypot(dx, dy) > 0.0 else hdg
-        found.append(GroundPose(spot.x, spot.y, spot.z, hdg))
-    return found
+        poses.append(GroundPose(spot.x, spot.y, spot.z, hdg))
+    return poses

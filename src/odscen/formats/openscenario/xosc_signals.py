@@ -54,8 +54,8 @@ def traffic_signals(source: ExportSource, notes: ExportNotes) -> _Element | None
         return None
     programs = realized_lights(source.scenario, source.sumo_map)
     found = [
-        _write_controller(light, one.shown, notes)
-        for light, one in zip(lights, programs, strict=True)
+        _write_controller(light, program.shown, notes)
+        for light, program in zip(lights, programs, strict=True)
         if any(light.signals)
     ]
     return xml("TrafficSignals", *found) if found else None

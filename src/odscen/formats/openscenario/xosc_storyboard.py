@@ -190,10 +190,10 @@ class Story:
         makes = Actions(self.places, self.dialect, self.notes, actors, self.scenario.rules)
         made: list[_Element] = []
         lasting: float | None = None
-        said = _items_written(rule)
-        for index in {*range(len(rule.then))} - {*said}:
+        written_items = _items_written(rule)
+        for index in {*range(len(rule.then))} - {*written_items}:
             self.notes.approximated.append((f"{where}.then", f"item {index}: {IGNORES}"))
-        for index in said:
+        for index in written_items:
             item = rule.then[index]
             actions = [
                 action
@@ -207,14 +207,14 @@ class Story:
             name = _event_name(rule, index)
             trigger = (
                 triggers.trigger(rule.when, rule.actor, where)
-                if index == said[0]
-                else triggers.after(_event_name(rule, said[len(made) - 1]), lasting)
+                if index == written_items[0]
+                else triggers.after(_event_name(rule, written_items[len(made) - 1]), lasting)
             )
             over = "override" if self.dialect.minor >= 2 else "overwrite"
             priority = "parallel" if lasting is None else over
             made.append(event(name, actions, trigger, rule.times, priority=priority))
             lasting = _lasting_gap(item)
-            if lasting is not None and index == said[-1]:
+            if lasting is not None and index == written_items[-1]:
                 words = "the gap is kept until another action takes the speed"
                 self.notes.approximated.append((f"{where}.then[{index}]", words))
         return maneuver_group(rule.id, rule.actor, made)
@@ -294,8 +294,8 @@ def maneuver_group(name: str, actor: str | None, events: Sequence[_Element]) -> 
 
 def _first_and_last_event(rule: StoryRule) -> tuple[str, str]:
     """Names of the first and the last event of a rule."""
-    said = _items_written(rule)
-    return _event_name(rule, said[0]), _event_name(rule, said[-1])
+    written_items = _items_written(rule)
+    return _event_name(rule, written_items[0]), _event_name(rule, written_items[-1])
 
 
 def _items_written(rule: StoryRule) -> list[int]:
@@ -307,7 +307,7 @@ def _items_written(rule: StoryRule) -> list[int]:
 
 def _run_ending_item(rule: StoryRule) -> int | None:
     """Item of a rule that ends the run: the stop trigger, and no event."""
-    return next((n for n, one in enumerate(rule.then) if one.kind == "end"), None)
+    return next((n for n, item in enumerate(rule.then) if item.kind == "end"), None)
 
 
 def _event_name(rule: StoryRule, index: int) -> str:

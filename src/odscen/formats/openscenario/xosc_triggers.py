@@ -76,9 +76,9 @@ def after_story_of(name: str) -> AfterStory:
     """
     if name == END:
         return "auto"
-    found = _SETTLED.fullmatch(name)
+    match = _SETTLED.fullmatch(name)
     try:
-        seconds = -1.0 if found is None else float(found[1])
+        seconds = -1.0 if match is None else float(match[1])
     except ValueError:
         seconds = -1.0
     return seconds if 0.0 <= seconds <= LONGEST_AFTER_STORY else "never"
@@ -208,8 +208,8 @@ def _condition_groups(
                 condition.not_, f"{place}.not", negated=not negated, delay=delay
             )
         parts = [
-            _condition_groups(one, f"{place}.{kind}[{index}]", negated=negated, delay=delay)
-            for index, one in enumerate(getattr(condition, kind))
+            _condition_groups(part, f"{place}.{kind}[{index}]", negated=negated, delay=delay)
+            for index, part in enumerate(getattr(condition, kind))
         ]
         if (kind == "any") != negated:
             return [group for part in parts for group in part]
@@ -397,7 +397,7 @@ def _write_touched(_made: Triggers, leaf: Leaf) -> _Element:
     return xml("CollisionCondition", xml("EntityRef", entityRef=leaf.part.to))
 
 
-def _off_road(_made: Triggers, leaf: Leaf) -> _Element:
+def _write_off_road(_made: Triggers, leaf: Leaf) -> _Element:
     _refuse_negated(leaf)
     return xml("OffroadCondition", duration=0.0)
 
@@ -419,5 +419,5 @@ _MAKERS: Final[Mapping[str, Callable[[Triggers, Leaf], _Element]]] = {
     "signal": _write_signal,
     "rule": _write_rule,
     "touched": _write_touched,
-    "off_road": _off_road,
+    "off_road": _write_off_road,
 }

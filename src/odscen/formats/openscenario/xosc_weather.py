@@ -41,7 +41,7 @@ _HOURS = ((0.0, 0), (20.0, 18), (90.0, 12))
 
 
 def environment(
-    parameters: Mapping[str, float], clock: float, dialect: Dialect, said: Mapping[str, Any]
+    parameters: Mapping[str, float], clock: float, dialect: Dialect, fields: Mapping[str, Any]
 ) -> _Element:
     """``Environment``.
 
@@ -51,7 +51,7 @@ def environment(
         Of CARLA's weather.
     clock
         Time of day at the start, seconds; of 0, as in a scenario without one, that of the sun.
-    said
+    fields
         What the document says itself, written as properties so that it can be read again.
     """
     minutes, seconds = divmod(int(clock or _hour_of_sun(parameters) * 3600), 60)
@@ -63,7 +63,9 @@ def environment(
         _write_weather(parameters, dialect),
         xml(
             "RoadCondition",
-            xml("Properties", *(_write_property(*row) for row in said.items())) if said else None,
+            xml("Properties", *(_write_property(*row) for row in fields.items()))
+            if fields
+            else None,
             frictionScaleFactor=weather_effect(parameters).grip,
             **_wetness_attributes(parameters, dialect),
         ),
@@ -73,8 +75,8 @@ def environment(
 
 def said_of(scenario: Scenario) -> dict[str, Any]:
     """What a scenario says of weather and time, but for what is the same in every new one."""
-    said = scenario.environment.model_dump(mode="json", exclude_defaults=True)
-    return said | ({"clock": scenario.demand.clock} if scenario.demand.clock else {})
+    fields = scenario.environment.model_dump(mode="json", exclude_defaults=True)
+    return fields | ({"clock": scenario.demand.clock} if scenario.demand.clock else {})
 
 
 def _write_property(name: str, value: Any) -> _Element:

@@ -116,7 +116,7 @@ def with_formulas(node: Any, reached: set[Source], *, key: str = "") -> Any:
         Gets the attributes of the file that the formulas come from.
     """
     if isinstance(node, dict):
-        return {name: with_formulas(one, reached, key=name) for name, one in node.items()}
+        return {name: with_formulas(part, reached, key=name) for name, part in node.items()}
     if isinstance(node, list | tuple):
         return [with_formulas(inner, reached, key=key) for inner in node]
     if not isinstance(node, TracedNumber):

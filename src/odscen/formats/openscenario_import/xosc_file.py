@@ -113,7 +113,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
     report, root = source.report, source.root
     entities = _read_all_entities(report, root)
     if len(source.graph.walks.x) == 0:
-        _on_wheels(report, entities.values())
+        _make_motorcycles(report, entities.values())
     positions = PositionReader(
         report, source.graph, source.road_point, source.lane_t, _side_of_y(root),
         varied=source.varied,
@@ -135,7 +135,7 @@ def read_openscenario(source: XoscSource, *, name: str, ego: EgoDriver = "story"
         "map": {"name": source.map_name, "sha256": source.sha256,
                 "spacing": source.graph.lanes.spacing},
         "roi": _find_region(source.graph, actors),
-        "drivers": {"sets": [STEADY_DRIVER] if _any_steady(actors) else []},
+        "drivers": {"sets": [STEADY_DRIVER] if _has_steady_actor(actors) else []},
         "actors": actors,
         "simulation": simulation,
         "environment": found.environment,
@@ -206,7 +206,7 @@ def _begin_story(
     return story, init, board, found
 
 
-def _on_wheels(report: ImportReport, entities: Iterable[ReadEntity]) -> None:
+def _make_motorcycles(report: ImportReport, entities: Iterable[ReadEntity]) -> None:
     """Make motorcycles of pedestrians, for SUMO has none where a map has nothing to walk on."""
     for entity in entities:
         if entity.category is Category.PEDESTRIAN:
@@ -227,7 +227,7 @@ def _find_region(graph: MapGraph, actors: list[dict[str, Any]]) -> list[str]:
     return [str(name) for name in parts_with(graph.segments, found)]
 
 
-def _any_steady(actors: list[dict[str, Any]]) -> bool:
+def _has_steady_actor(actors: list[dict[str, Any]]) -> bool:
     return any(actor.get("style") == STEADY for actor in actors)
 
 

@@ -174,5 +174,5 @@ class ImportRecord(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Form for ``map.json``, without the rows, which are in the import report."""
-        told = {key: value for key, value in self._asdict().items() if key != "entries"}
-        return {key: value for key, value in told.items() if key != "edits" or value}
+        values = {key: value for key, value in self._asdict().items() if key != "entries"}
+        return {key: value for key, value in values.items() if key != "edits" or value}

@@ -51,8 +51,6 @@ _MARKS = {
 }
 _LIMIT_SIGNS = ("274", "R2-1", "274.1")
 _MILLIMETRES = 1000.0
-_SHARED = 0.1
-"""Metres between ends of bounds that are one line."""
 
 
 class CommonRoadImporter(MapImporter):
@@ -98,12 +96,15 @@ def read_commonroad_lanelets(content: bytes) -> LaneletMap:
     InputError
         If it is no CommonRoad scenario, or a coordinate is no number.
     """
-    from odscen.maps.importers.lanelet2.lanelet_file import LaneletMap, add_relations
+    from odscen.maps.importers.lanelet2.lanelet_file import (
+        LaneletMap,
+        add_relations,
+    )
 
     root = read_xml(content, huge=True, bare=True)
     if root.tag != "commonRoad":
         raise InputError(f"its root element is <{root.tag}>, not <commonRoad>")
-    found = LaneletMap({}, {})
+    lanelet_map = LaneletMap({}, {})
     relations: list[Relation] = []
     limits = _limits_of_signs(root)
     for lanelet in root.iterfind("lanelet"):
@@ -112,23 +113,26 @@ def read_commonroad_lanelets(content: bytes) -> LaneletMap:
         for side in ("left", "right"):
             way = f"{identity} {side}"
             bound = lanelet.find(f"{side}Bound")
-            found.ways[way] = _nodes_of(bound, found.points, f"lanelet {identity} > {side}Bound")
+            lanelet_map.ways[way] = _nodes_of(
+                bound, lanelet_map.points, f"lanelet {identity} > {side}Bound"
+            )
             mark = "" if bound is None else (bound.findtext("lineMarking") or "").strip()
             kind, subtype = _MARKS.get(mark, ("virtual", ""))
-            found.way_tags[way] = {"type": kind, "subtype": subtype} if subtype else {"type": kind}
+            lanelet_map.way_tags[way] = (
+                {"type": kind, "subtype": subtype} if subtype else {"type": kind}
+            )
             members[side] = [("way", way)]
         relations.append((identity, _tags_of(lanelet, limits), members))
     for lanelet in root.iterfind("lanelet"):
-        _share_bound(lanelet, found)
-    add_relations(found, relations)
-    return found
+        _share_bound(lanelet, lanelet_map)
+    add_relations(lanelet_map, relations)
+    return lanelet_map
 
 
 def _share_bound(lanelet: etree._Element, found: LaneletMap) -> None:
-    """Give a lanelet the line of its left neighbour as its own bound, where both end alike.
+    """Give a lanelet the line of its left neighbour as its own bound, where both end alike."""
+    from odscen.maps.importers.lanelet2.lanelet_file import share_line
 
-    Files have other points along the line that two lanelets share.
-    """
     beside = lanelet.find("adjacentLeft")
     if beside is None:
         return
@@ -139,14 +143,7 @@ def _share_bound(lanelet: etree._Element, found: LaneletMap) -> None:
     )
     if not is_same and own < other:
         return  # the other one takes this one's
-    line, theirs = found.ways[own], found.ways.get(other, ())
-    if not is_same:
-        theirs = theirs[::-1]
-    if len(line) < 2 or len(theirs) < 2:
-        return
-    ends = zip(found.line((line[0], line[-1])), found.line((theirs[0], theirs[-1])), strict=True)
-    if all(math.dist(a, b) <= _SHARED for a, b in ends):
-        found.ways[own] = theirs
+    share_line(found, own, other, turned=not is_same)
 
 
 def _nodes_of(

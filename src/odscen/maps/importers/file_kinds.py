@@ -38,8 +38,8 @@ def root_element(content: bytes) -> str | None:
     """Name of the first element of an XML file, without its namespace; ``None`` if it is none."""
     head = content[:_HEAD]
     encoding = "utf-16" if head.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
-    found = _PROLOGUE.match(head.decode(encoding, "replace"))
-    return found[1].rpartition(":")[2] if found else None
+    match = _PROLOGUE.match(head.decode(encoding, "replace"))
+    return match[1].rpartition(":")[2] if match else None
 
 
 def file_kind(content: bytes, file: str) -> FileKind:

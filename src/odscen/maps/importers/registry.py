@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from odscen.base.errors import InputError, OdscenError
 from odscen.convert.model.conversion_report import ElementOutcome, ReportEntry
 from odscen.learning.offered_options import options_of, values_for
+from odscen.maps.importers.argoverse import ArgoverseImporter
 from odscen.maps.importers.base import ImportedMap, ImportRecord, MapImporter
 from odscen.maps.importers.commonroad import CommonRoadImporter
 from odscen.maps.importers.file_kinds import file_kind
@@ -32,6 +33,7 @@ SHIPPED: tuple[type[MapImporter], ...] = (
     Lanelet2Importer,
     OpenStreetMapImporter,
     CommonRoadImporter,
+    ArgoverseImporter,
 )
 """Importers of odscen's own, in the order in which they are listed."""
 

@@ -332,7 +332,13 @@ def signal_problems(
             yield error("light_twice", f"{where}.junction", message)
         timed.setdefault(light.names, where)
         yield from _green_problems(timing, light, where)
-        control = timing.control or signals.control
+        control = signals.control_of(timing)
+        if timing.stages and timing.control == "extended":
+            message = (
+                f"the light of junction {timing.junction!r} has a program of its own; extended "
+                "control is for stages of the map, make it fixed or actuated"
+            )
+            yield error("extended_needs_map_stages", f"{where}.control", message)
         yield from program_problems(timing, light, control, where, clock=clock, until=until)
         asked = signals.bus_priority if timing.bus_priority is None else timing.bus_priority
         if asked:

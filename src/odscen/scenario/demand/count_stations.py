@@ -133,11 +133,11 @@ def place_points(graph: MapGraph, places: Iterable[str]) -> dict[str, tuple[floa
         names = place_segments(place)
         if not all(name in rows for name in names):
             continue
-        one = [rows[name] for name in names]
+        place_rows = [rows[name] for name in names]
         groups = (
-            [np.flatnonzero(lanes.segment == one[0])]
-            if len(one) == 1
-            else [source[(ends[0] == a) & (ends[1] == b)] for a, b in pairwise(one)]
+            [np.flatnonzero(lanes.segment == place_rows[0])]
+            if len(place_rows) == 1
+            else [source[(ends[0] == a) & (ends[1] == b)] for a, b in pairwise(place_rows)]
         )
         if all(len(group) for group in groups):
             found[place] = (
@@ -156,9 +156,9 @@ def contradictions(counts: Counts, graph: MapGraph) -> Iterator[Contradiction]:
     """
     onwards = transitions(graph)
     before: dict[str, set[str]] = defaultdict(set)
-    for one, others in onwards.items():
+    for segment, others in onwards.items():
         for other in others:
-            before[other].add(one)
+            before[other].add(segment)
     slices: dict[tuple[float, float], dict[tuple[str, ...], float]] = defaultdict(dict)
     for place, begin, end, number in counts.rows:
         slices[begin, end][place_segments(place)] = number

@@ -88,12 +88,12 @@ def most_road_users() -> int:
     InputError
         If the environment says something else than a number.
     """
-    said = os.environ.get(VARIABLE)
-    if not said:
+    setting = os.environ.get(VARIABLE)
+    if not setting:
         return MOST_ROAD_USERS
-    if not said.isascii() or not said.isdigit():
-        raise InputError(f"{VARIABLE} is {said!r}, which is no whole number")
-    return int(said)
+    if not setting.isascii() or not setting.isdigit():
+        raise InputError(f"{VARIABLE} is {setting!r}, which is no whole number")
+    return int(setting)
 
 
 def refuse_too_many(expected: Mapping[str, float]) -> None:

@@ -73,7 +73,7 @@ def read_targets(text: str, *, clock: float = 0.0) -> tuple[Target, ...]:
     InputError
         With the line and the value that cannot be used.
     """
-    found: dict[tuple[str, str, float, float], Target] = {}
+    targets: dict[tuple[str, str, float, float], Target] = {}
     for line in read_target_lines(text):
         kind, place = line["kind"].lower(), line["place"]
         if kind not in KINDS:
@@ -88,10 +88,10 @@ def read_targets(text: str, *, clock: float = 0.0) -> tuple[Target, ...]:
         begin, end = line.slice(clock)
         place = place if kind == TRAVEL_TIME else place.replace(" ", "").replace("+", " + ")
         key = (kind, place, begin, end)
-        if key in found:
-            raise InputError(f"the {found[key].words}, is there twice", element=line.where)
-        found[key] = Target(*key, line.number("value"), held=use == "validate")
-    return tuple(found.values())
+        if key in targets:
+            raise InputError(f"the {targets[key].words}, is there twice", element=line.where)
+        targets[key] = Target(*key, line.number("value"), held=use == "validate")
+    return tuple(targets.values())
 
 
 def hold_back(targets: Sequence[Target], share: float, *, seed: int) -> tuple[Target, ...]:

@@ -136,14 +136,14 @@ class ParkingChoice:
         columns = np.searchsorted(np.unique(goals), goals)
         rows, table = self._router.reach(self._nodes, self._nodes)
         between = table[rows]
-        found: dict[str, ParkedTrip] = {}
+        parked_trips: dict[str, ParkedTrip] = {}
         for at in sorted(range(len(trips)), key=lambda at: (trips[at].depart, trips[at].id)):
             parked_trip = self._choose_for_trip(
                 trips[at], from_starts[onto[at]], to_goals[:, columns[at]], between
             )
             if parked_trip != ParkedTrip():
-                found[trips[at].id] = parked_trip
-        return found
+                parked_trips[trips[at].id] = parked_trip
+        return parked_trips
 
     def _choose_for_trip(
         self, trip: ParkableTrip, reached: BoolArray, leads: BoolArray, between: BoolArray
@@ -426,7 +426,7 @@ def _draw_trips(
     return Trips(
         name=name,
         part=part.id,
-        categories=[one for one, ok in zip(categories, met.tolist(), strict=True) if ok],
+        categories=[category for category, ok in zip(categories, met.tolist(), strict=True) if ok],
         starts=starts[met],
         goals=goals[met],
         departs=departs[met],
@@ -462,7 +462,7 @@ def _first_crowd(
     spots = place_at_random(supply, round(now), rng)
     numbers = rng.random(len(spots))
     lanes = ground.region.graph.lanes
-    placed = _placed_crowd(scenario, ground.region, usable)
+    placed = _gather_placed_crowd(scenario, ground.region, usable)
     categories, starts, goals = [], [], []
     for spot, number in zip(spots, numbers, strict=True):
         reach = ground.reachable_ends(spot.category)
@@ -483,7 +483,7 @@ def _first_crowd(
     )
 
 
-def _placed_crowd(scenario: Scenario, region: Region, usable: Usable) -> Crowd:
+def _gather_placed_crowd(scenario: Scenario, region: Region, usable: Usable) -> Crowd:
     """Placed actors who are there from the start, with a gap about them."""
     placed = [
         (place, actor, body_of(actor) if actor.size else usable.bodies[actor.category])

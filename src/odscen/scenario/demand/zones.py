@@ -81,9 +81,9 @@ class ReachableEnds(NamedTuple):
         alike = alike + self.from_segment[picked]
         for key in np.unique(alike).tolist():
             mine = np.flatnonzero(alike == key)
-            one = picked[mine[0]]
-            possible = self.table[self.row[one]]
-            elsewhere = possible & (self.to_segment != self.from_segment[one])
+            first = picked[mine[0]]
+            possible = self.table[self.row[first]]
+            elsewhere = possible & (self.to_segment != self.from_segment[first])
             ends = self.ends[elsewhere if elsewhere.any() else possible]
             if len(ends):
                 goals[mine] = ends[(uniform[mine] * len(ends)).astype(np.intp)]

@@ -67,7 +67,7 @@ class EditBase(BaseModel):
     def words(self) -> str:
         """The edit in one line: what undo calls it, and its arguments."""
         given = json.dumps(
-            {name: one for name, one in self.data.items() if name != "kind"}, ensure_ascii=False
+            {name: value for name, value in self.data.items() if name != "kind"}, ensure_ascii=False
         )
         shown = given if len(given) <= _LONGEST else given[:_LONGEST] + "..."
         return f"{self.label} ({self.kind} {shown})"
@@ -80,7 +80,7 @@ class EditBase(BaseModel):
 
 def _message_model(name: str, function: Callable[..., Scenario]) -> type[EditBase]:
     documents = (document_parts, signals_document, scenario_document)
-    known = {name: one for document in documents for name, one in vars(document).items()}
+    known = {name: value for document in documents for name, value in vars(document).items()}
     names = {**known, **dict.fromkeys(_KNOWN.values(), object), **_JSON}
     hints = get_type_hints(function, localns=names, include_extras=True)
     fields: dict[str, Any] = {"kind": (Literal[name], ...)}

@@ -63,7 +63,7 @@ def with_group(
     else:
         new = validated(ProgramGroup, {**fields, "id": name})
         timing = _join_group(timing, light, new)
-    return _moved_here(timing, light, name) if "movements" in fields else timing
+    return _take_movements(timing, light, name) if "movements" in fields else timing
 
 
 def _replace_group(timing: JunctionTiming, old: ProgramGroup, new: ProgramGroup) -> JunctionTiming:
@@ -100,7 +100,7 @@ def _join_group(timing: JunctionTiming, light: Light, new: ProgramGroup) -> Junc
         )
         for stage in timing.stages
     )
-    at = next((n + 1 for n, one in enumerate(timing.groups) if one.id == from_group), 0)
+    at = next((n + 1 for n, group in enumerate(timing.groups) if group.id == from_group), 0)
     changes = {
         "groups": (*timing.groups[:at], new, *timing.groups[at:]),
         "stages": stages,
@@ -109,7 +109,7 @@ def _join_group(timing: JunctionTiming, light: Light, new: ProgramGroup) -> Junc
     return changed_part(timing, changes)
 
 
-def _moved_here(timing: JunctionTiming, light: Light, name: str) -> JunctionTiming:
+def _take_movements(timing: JunctionTiming, light: Light, name: str) -> JunctionTiming:
     """A program in which no other group has the movements of this one."""
     groups = {group.id: set(designed_group(group, light).movements) for group in timing.groups}
     own = groups[name]
@@ -542,12 +542,12 @@ def set_plan(
     )
     own = set(map(seconds_of_day, new.times))
     left = tuple(
-        one
+        plan
         if index == at or "times" not in fields
         else changed_part(
-            one, {"times": tuple(t for t in one.times if seconds_of_day(t) not in own)}
+            plan, {"times": tuple(t for t in plan.times if seconds_of_day(t) not in own)}
         )
-        for index, one in enumerate(plans)
+        for index, plan in enumerate(plans)
     )
     made = changed_part(old, {"plans": left, "offset": 0.0})
     orders = {name for day_plan in left for name in (*day_plan.stages, *day_plan.green)}

@@ -51,7 +51,7 @@ def grow_roi(scenario: Scenario, graph: MapGraph, segment: str) -> Scenario:
     NotFoundError
         If the map has no such segment.
     """
-    _known_segment(graph, segment)
+    _require_segment(graph, segment)
     if segment in scenario.roi:
         raise ScenarioError(f"segment {segment!r} is in the region of interest already")
     if segment not in eligible_segments(scenario, graph):
@@ -78,7 +78,7 @@ def extend_roi(scenario: Scenario, graph: MapGraph, segments: Sequence[str]) -> 
         If the map has no such segment.
     """
     for segment in segments:
-        _known_segment(graph, segment)
+        _require_segment(graph, segment)
     roi = tuple(dict.fromkeys((*scenario.roi, *segments)))
     if len(roi) == len(scenario.roi):
         raise ScenarioError("all of these segments are in the region of interest already")
@@ -106,7 +106,7 @@ def shrink_roi(
         If the segment is not inside, if the rest would be in several pieces, or if actors or flows
         use it.
     """
-    _known_segment(graph, segment)
+    _require_segment(graph, segment)
     if segment not in scenario.roi:
         raise ScenarioError(f"segment {segment!r} is not in the region of interest")
     if segment not in removable_segments(scenario, graph):
@@ -128,7 +128,7 @@ def shrink_roi(
     )
 
 
-def _known_segment(graph: MapGraph, segment: str) -> None:
+def _require_segment(graph: MapGraph, segment: str) -> None:
     if segment not in graph.segments.ids:
         raise NotFoundError("segment", segment, graph.segments.ids)
 

@@ -64,11 +64,11 @@ def set_parameter(
     if instead_of is not None and instead_of != parameter:
         scenario = _rename_parameter_uses(scenario, instead_of, parameter)
     data = from_json(dumps(scenario))
-    one = data.setdefault("parameters", {}).setdefault(parameter, {})
-    one |= {name: value for name, value in fields.items() if value is not None}
+    declaration = data.setdefault("parameters", {}).setdefault(parameter, {})
+    declaration |= {name: value for name, value in fields.items() if value is not None}
     for name, value in fields.items():
         if value is None:
-            one.pop(name, None)
+            declaration.pop(name, None)
     return loads(json.dumps(data))
 
 
@@ -82,7 +82,9 @@ def remove_parameter(scenario: Scenario, *, parameter: str) -> Scenario:
         If there is none of that name.
     """
     _refuse_unknown(scenario, parameter)
-    left = {name: one for name, one in scenario.parameters.items() if name != parameter}
+    left = {
+        name: declaration for name, declaration in scenario.parameters.items() if name != parameter
+    }
     kept = {
         place: text
         for place, text in scenario.formulas.items()
@@ -116,7 +118,7 @@ def set_formula(scenario: Scenario, *, place: str, formula: str | None) -> Scena
     data = from_json(dumps(alone))
     if formula is None:
         return loads(json.dumps(data))
-    evaluate(formula, {name: one.value for name, one in scenario.parameters.items()})
+    evaluate(formula, {name: parameter.value for name, parameter in scenario.parameters.items()})
     if not names_in(formula):
         raise ScenarioError(
             f"{place}: the formula {formula!r} names no parameter; write $gap for one called gap"

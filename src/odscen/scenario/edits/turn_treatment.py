@@ -189,7 +189,7 @@ class _Treatment:
         alone = {stage.id for stage in cleared if not stage.groups}
         kept = [name for name in (*fits, *sorted(alone)) if name in before]
         turns = [
-            stage.id for stage in cleared if stage.id in fits and self._only_turns(stage.groups)
+            stage.id for stage in cleared if stage.id in fits and self._has_only_turns(stage.groups)
         ]
         return next(iter((*kept, *turns)), None)
 
@@ -201,7 +201,7 @@ class _Treatment:
             for j in self._turn.movements
         )
 
-    def _only_turns(self, groups: Iterable[str]) -> bool:
+    def _has_only_turns(self, groups: Iterable[str]) -> bool:
         turns = {
             n for crossing_turn in crossing_turns(self._light) for n in crossing_turn.movements
         }

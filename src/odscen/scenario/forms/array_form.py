@@ -117,13 +117,13 @@ def _actor_arrays(
              for actor in actors]  # fmt: skip
     document["actors"] = [
         _remaining_fields(
-            one,
+            actor,
             {"id", "category", *ACTOR_COLUMNS}
             | _fields_with_index(spawn=node[row], goal=goal[row])
-            | ({"via"} if np.all(via[row, : len(one.via)] >= 0) else set())
+            | ({"via"} if np.all(via[row, : len(actor.via)] >= 0) else set())
             | ({"style"} if style[row] != OTHER_STYLE else set()),
         )
-        for row, one in enumerate(actors)
+        for row, actor in enumerate(actors)
     ]
     return {
         "actor_id": texts(actor.id for actor in actors),
@@ -148,10 +148,10 @@ def _flow_arrays(
     goal = _node_indices([flow.goal for flow in flows], walks, graph)
     document["flows"] = [
         _remaining_fields(
-            one, {"id", "mix", *FLOW_COLUMNS} | _fields_with_index(spawn=node[row], goal=goal[row])
+            flow, {"id", "mix", *FLOW_COLUMNS} | _fields_with_index(spawn=node[row], goal=goal[row])
         )
-        | _mix_order(one)
-        for row, one in enumerate(flows)
+        | _mix_order(flow)
+        for row, flow in enumerate(flows)
     ]
     mixes = [[flow.mix.get(category, 0.0) for category in CATEGORIES] for flow in flows]
     return {
@@ -195,8 +195,8 @@ def _node_indices(names: Sequence[str | None], walks: Sequence[bool], graph: Map
 def _via_indices(actors: Sequence[Actor], walks: Sequence[bool], graph: MapGraph) -> Array:
     """Shape ``(A, V)``, filled up with :data:`NO_NODE`; a row with an unknown node has none."""
     found = np.full((len(actors), max((len(actor.via) for actor in actors), default=0)), NO_NODE)
-    for row, one in enumerate(actors):
-        nodes = _node_indices(one.via, [walks[row]] * len(one.via), graph)
+    for row, user in enumerate(actors):
+        nodes = _node_indices(user.via, [walks[row]] * len(user.via), graph)
         if np.all(nodes >= 0):
             found[row, : len(nodes)] = nodes
     return found

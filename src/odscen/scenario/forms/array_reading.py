@@ -76,7 +76,7 @@ def from_arrays(arrays: Mapping[str, Array], *, file: str | None = None) -> Scen
         If a value is not possible; names each with its array and row.
     """
     try:
-        reading = _ArrayReading({name: np.asarray(one) for name, one in arrays.items()})
+        reading = _ArrayReading({name: np.asarray(values) for name, values in arrays.items()})
         scenario = _validate_scenario(reading.fields(), reading.rows)
         return loads(dumps(scenario)) if scenario.formulas else scenario
     except InputError as error:
@@ -100,11 +100,11 @@ def _validate_scenario(fields: Mapping[str, Any], tables: Mapping[str, frozenset
 
 def _name_array_place(problem: str, tables: Mapping[str, frozenset[str]]) -> str:
     """Say the array and row in place of the field of the document, where it has a column."""
-    place, colon, said = problem.partition(": ")
+    place, colon, reason = problem.partition(": ")
     table, _, rest = place.partition("s[")
     row, _, field = rest.partition("].")
     if colon and field in tables.get(table, ()):
-        return f"array {table}_{field}, row {row}: {said}"
+        return f"array {table}_{field}, row {row}: {reason}"
     return problem
 
 
@@ -123,8 +123,8 @@ class _ArrayReading:
         self.rows = {"actor": frozenset(ACTOR_COLUMNS), "flow": frozenset(FLOW_COLUMNS)}
         self._document = self._read_json()
         self._graph: MapGraph = graph_from_arrays(arrays)
-        said = self._document.get("map")
-        if isinstance(said, dict) and said.get("sha256") != self._graph.map_sha256:
+        map_fields = self._document.get("map")
+        if isinstance(map_fields, dict) and map_fields.get("sha256") != self._graph.map_sha256:
             raise InputError(
                 f"its graph is of {self._graph.map_sha256[:12]}..., the document of another map",
                 element="array map",

@@ -254,7 +254,7 @@ def from_graph(graph: nx.MultiDiGraph) -> Scenario:
     }
     for name in _JSON:
         if name in about:
-            fields[name] = _from_json(name, about[name])
+            fields[name] = _read_json(name, about[name])
     fields["actors"] = tuple(_read_from_nodes(graph, "actor", Actor))
     fields["flows"] = tuple(_read_from_nodes(graph, "flow", Flow))
     return validated(Scenario, fields)
@@ -356,7 +356,7 @@ def _read_from_nodes(graph: nx.MultiDiGraph, prefix: str, model: type[_One]) -> 
         if "id" not in fields:
             fields["id"] = next(free)
         for name in {"mix", "via", "size"} & fields.keys():
-            fields[name] = _from_json(name, fields[name])
+            fields[name] = _read_json(name, fields[name])
         yield _validate_fields(model, fields)
 
 
@@ -378,7 +378,7 @@ def _validate_fields(model: type[_One], fields: dict[str, Any]) -> _One:
         raise
 
 
-def _from_json(name: str, text: object) -> Any:
+def _read_json(name: str, text: object) -> Any:
     try:
         return json.loads(str(text))
     except (ValueError, RecursionError) as error:

@@ -57,7 +57,7 @@ def vehicle_supply(
     """Places for vehicles: on road lanes with room for the body and with a goal to reach."""
     lanes = region.graph.lanes
     spawnable = _or_all(usable.spawnable, len(lanes.x))
-    centre = region.lanes & spawnable & _on_roads(lanes, places)
+    centre = region.lanes & spawnable & _mask_of_roads(lanes, places)
     centre &= _with_goal(region, places, usable)
     excluded = set(places.exclude_segments)
     kept = np.array([name not in excluded for name in region.graph.segments.ids], dtype=np.bool_)
@@ -95,7 +95,7 @@ WALKER_GAP = 0.5
 """Free length between two sampled pedestrians, metres."""
 
 
-def _on_roads(lanes: LaneGraph, places: PlacingRules) -> BoolArray:
+def _mask_of_roads(lanes: LaneGraph, places: PlacingRules) -> BoolArray:
     """Nodes of lanes outside junctions, of the types that are asked for."""
     types = set(places.lane_types)
     good = [

@@ -66,31 +66,31 @@ def resolve_goals(
         if not found:
             candidates = region.candidates(place)
             keeps = actor.driver == "story" and not actor.via and not place.walk
-            ahead = _lane_end(graph, place.node, candidates) if keeps else None
+            ahead = _find_lane_end(graph, place.node, candidates) if keeps else None
             drawn = int(stream(scenario.seed, "goal", actor.id).choice(candidates))
             goals[actor.id] = drawn if ahead is None else ahead
     refuse_errors(problems)
     return goals
 
 
-def _lane_end(graph: MapGraph, start: int, candidates: Int32Array) -> int | None:
+def _find_lane_end(graph: MapGraph, start: int, candidates: Int32Array) -> int | None:
     """Last of some nodes that a lane leads to, straight on at forks; ``None`` if to none."""
     lanes = graph.lanes
     edges = np.flatnonzero(lanes.relation == Relation.SUCCESSOR)
     edges = edges[np.argsort(lanes.source[edges], kind="stable")]
     sources = lanes.source[edges]
     wanted = set(candidates.tolist())
-    node, seen, found = start, {start}, None
+    node, seen, last_wanted = start, {start}, None
     while True:
         first, last = np.searchsorted(sources, (node, node + 1))
         onward = lanes.target[edges[first:last]]
         if not len(onward):
-            return found
+            return last_wanted
         node = int(onward[np.argmax(np.cos(lanes.hdg[onward] - lanes.hdg[node]))])
-        if node in seen:
-            return found
+        if node in seen:  # a roundabout, or a block that is driven around
+            return last_wanted
         seen.add(node)
-        found = node if node in wanted else found
+        last_wanted = node if node in wanted else last_wanted
 
 
 def flow_goals(

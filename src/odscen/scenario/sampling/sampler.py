@@ -113,7 +113,7 @@ def _dealt_styles(scenario: Scenario) -> dict[str, str]:
         group = [actor for actor in scenario.actors if actor.category is category and not actor.ego]
         styles = [actor.style for actor in group]
         order = stream(scenario.seed, "redrawn styles", category).permutation(len(group))
-        dealt |= {one.id: styles[place] for one, place in zip(group, order.tolist(), strict=True)}
+        dealt |= {user.id: styles[place] for user, place in zip(group, order.tolist(), strict=True)}
     return dealt
 
 

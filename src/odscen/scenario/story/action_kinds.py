@@ -75,11 +75,13 @@ def walk(part: Walking, acting_actor: ActingActor) -> float:
     line = (acting_actor.spot(), *places)
     if line_length(line) < 1e-6:
         return acting_actor.instant
-    _along_line(line, part.speed, acting_actor)
+    _drive_along_line(line, part.speed, acting_actor)
     return math.inf
 
 
-def _along_line(line: tuple[Point, ...], speed: float | None, acting_actor: ActingActor) -> None:
+def _drive_along_line(
+    line: tuple[Point, ...], speed: float | None, acting_actor: ActingActor
+) -> None:
     channel = acting_actor.channel
     usual = speed or acting_actor.view.walking_speed(acting_actor.actor.id)
     waits = channel.held and channel.speed_owner is None
@@ -137,13 +139,13 @@ def follow_path(part: PathFollowing, acting_actor: ActingActor) -> float:
         knots = (
             _time_of_legs(legs, part.times)
             if part.times
-            else _at_points(legs, part.speeds, acting_actor.speed)
+            else _times_at_points(legs, part.speeds, acting_actor.speed)
         )
         table = SpeedTable(acting_actor.instant, knots)
         channel.take_speed(table, acting_actor.owner)
         end = table.end
     elif person or part.speed is not None:
-        _along_line(line, part.speed, acting_actor)
+        _drive_along_line(line, part.speed, acting_actor)
         end = math.inf
     elif acting_actor.speed > 0.0 or channel.law is not None:
         end = math.inf
@@ -292,7 +294,7 @@ def _time_of_legs(legs: list[float], times: tuple[float, ...]) -> tuple[tuple[fl
     return tuple(knots)
 
 
-def _at_points(
+def _times_at_points(
     legs: list[float], speeds: tuple[float, ...], speed: float
 ) -> tuple[tuple[float, float], ...]:
     """Speeds that change evenly over time between points."""
@@ -433,7 +435,7 @@ def change_lane(part: LaneChange, acting_actor: ActingActor) -> float:
         missing = f"there is no lane {abs(by)} to the {'left' if by > 0 else 'right'} for it"
     if line is None or not _leads_on(line, _front_of_actor(acting_actor), acting_actor.actor.hdg):
         raise CannotAct(missing)
-    return _beside_lane(line, part.offset, part, acting_actor)
+    return _move_beside_lane(line, part.offset, part, acting_actor)
 
 
 def _back_in_lane(by: int, acting_actor: ActingActor) -> tuple[Point, ...] | None:
@@ -470,7 +472,7 @@ def move_aside(part: LateralMove, acting_actor: ActingActor) -> float:
     line = led or acting_actor.view.lane_line(acting_actor.actor.id, 0)
     if line is None:
         raise CannotAct("it is on no lane")
-    return _beside_lane(line, part.to, part, acting_actor)
+    return _move_beside_lane(line, part.to, part, acting_actor)
 
 
 def cut_in(part: CuttingIn, acting_actor: ActingActor) -> float:
@@ -485,7 +487,7 @@ def cut_in(part: CuttingIn, acting_actor: ActingActor) -> float:
     line = acting_actor.view.lane_line(part.to, 0)
     if line is None:
         raise CannotAct(f"{part.to!r} is on no lane")
-    end = _beside_lane(line, 0.0, part, acting_actor)
+    end = _move_beside_lane(line, 0.0, part, acting_actor)
     _reach_gap(part, acting_actor, other, end)
     return end
 
@@ -565,7 +567,7 @@ def _other_actor(part: CuttingIn, acting_actor: ActingActor) -> ActorView:
     return other
 
 
-def _beside_lane(
+def _move_beside_lane(
     line: tuple[Point, ...], left: float, part: _Sideways, acting_actor: ActingActor
 ) -> float:
     """Move the front to ``left`` metres of a line; returns when it is there, if that is known."""
@@ -620,7 +622,8 @@ def arrive(part: Arriving, acting_actor: ActingActor) -> float:
     """Begin: a pedestrian goes straight to the place, unless it is on a line that leads there."""
     if (
         acting_actor.actor.person
-        and _on_line(acting_actor.actor, part.at, acting_actor.view, acting_actor.channel) is None
+        and _measure_to_place(acting_actor.actor, part.at, acting_actor.view, acting_actor.channel)
+        is None
     ):
         line = (acting_actor.spot(), acting_actor.view.place(part.at))
         acting_actor.channel.take_speed(steady(acting_actor.instant, 0.0), acting_actor.owner)
@@ -711,7 +714,7 @@ def _own_rest(part: Arriving, acting_actor: ActingActor) -> float:
 def _metres_to_place(
     actor: ActorView, place: RulePlace, view: RoadView, channel: Channel | None
 ) -> float | None:
-    on_line = None if channel is None else _on_line(actor, place, view, channel)
+    on_line = None if channel is None else _measure_to_place(actor, place, view, channel)
     if on_line is not None:
         return on_line
     if actor.person:
@@ -719,7 +722,9 @@ def _metres_to_place(
     return view.lane_distance(actor.id, place)
 
 
-def _on_line(actor: ActorView, place: RulePlace, view: RoadView, channel: Channel) -> float | None:
+def _measure_to_place(
+    actor: ActorView, place: RulePlace, view: RoadView, channel: Channel
+) -> float | None:
     """Metres from the centre to a place that the actor's line leads by; ``None`` without one."""
     if channel.line is None or channel.held:  # what is held stands, whatever line that is on
         return None
@@ -799,7 +804,7 @@ def _begin_brake(part: Braking, acting_actor: ActingActor) -> float:
     return law.end + (part.hold or 0.0)
 
 
-def _after_braking(part: Braking, acting_actor: ActingActor) -> None:
+def _end_braking(part: Braking, acting_actor: ActingActor) -> None:
     if part.hold is None:
         acting_actor.channel.keep_speed()
     else:
@@ -942,7 +947,7 @@ ACTIONS = {
             "brake", "brake with `by` to a standstill, whatever the vehicle type allows; SUMO "
             "drives on after `hold` seconds, without it not before `go` or `release`", "m/s², s",
             "`setSpeed` each step", "SpeedAction to 0", _MIRRORED, _begin_brake,
-            finish=_after_braking,
+            finish=_end_braking,
         ),
         ActionKind(
             "stop", "stand after exactly `within` metres, at once without it; until `go`", "m",

@@ -60,7 +60,7 @@ def polygon_distance(one: Sequence[Point], other: Sequence[Point]) -> float:
     if overlap(one, other):
         return 0.0
     return min(
-        _to_edge(corner, *edge)
+        _distance_to_edge(corner, *edge)
         for corners, edges in ((one, other), (other, one))
         for corner in corners
         for edge in _polygon_edges(edges)
@@ -87,7 +87,7 @@ def _polygon_edges(corners: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
     return zip(corners, (*corners[1:], corners[0]), strict=True)
 
 
-def _to_edge(point: Point, start: Point, end: Point) -> float:
+def _distance_to_edge(point: Point, start: Point, end: Point) -> float:
     dx, dy = end[0] - start[0], end[1] - start[1]
     square = dx * dx + dy * dy
     px, py = point[0] - start[0], point[1] - start[1]
@@ -265,17 +265,17 @@ def seconds_of(metres: float, speed: float) -> float:
 
 
 def _read_distance(part: DistanceBounded, actor: str, view: RoadView) -> Reading | None:
-    if (one := _actor_of_condition(part, actor, view)) is None:
+    if (body := _actor_of_condition(part, actor, view)) is None:
         return None
     if part.to is None:
-        value = _to_place(part, one, view)
+        value = _distance_to_place(part, body, view)
     else:
         other = view.actor(part.to)
-        value = None if other is None else _to_actor(part, one, other, view)
+        value = None if other is None else _distance_to_actor(part, body, other, view)
     return None if value is None else _read_bounded(part, value)
 
 
-def _to_actor(
+def _distance_to_actor(
     part: DistanceBounded, one: ActorView, other: ActorView, view: RoadView
 ) -> float | None:
     if part.along == "straight":
@@ -308,7 +308,9 @@ def _straight_distance(one: ActorView, other: ActorView, bound: float) -> float:
     return least if least > bound + _FAR else body_distance(one, other)
 
 
-def _to_place(part: DistanceBounded, actor_view: ActorView, view: RoadView) -> float | None:
+def _distance_to_place(
+    part: DistanceBounded, actor_view: ActorView, view: RoadView
+) -> float | None:
     place = view.place(part.place or "")
     x, y = _measured_point(actor_view, part.behind[0])
     dx, dy = place[0] - x, place[1] - y
@@ -395,15 +397,15 @@ def _read_appeared(part: OneActor, actor: str, view: RoadView) -> Reading:
 
 
 def _read_touched(part: Touching, actor: str, view: RoadView) -> Reading | None:
-    one = _actor_of_condition(part, actor, view)
-    if one is None:
+    body = _actor_of_condition(part, actor, view)
+    if body is None:
         return None
     others = [view.actor(part.to)] if part.to is not None else view.named()
-    near = [other for other in others if other is not None and other.id != one.id]
-    return _read_truth(any(body_distance(one, other) == 0.0 for other in near))
+    near = [other for other in others if other is not None and other.id != body.id]
+    return _read_truth(any(body_distance(body, other) == 0.0 for other in near))
 
 
-def _off_road(part: OneActor, actor: str, view: RoadView) -> Reading | None:
+def _read_off_road(part: OneActor, actor: str, view: RoadView) -> Reading | None:
     actor_view = _actor_of_condition(part, actor, view)
     return None if actor_view is None else _read_truth(actor_view.off_road)
 
@@ -479,7 +481,7 @@ CONDITIONS = {
         ),
         ConditionKind(
             "off_road", "the centre of the body is on no lane", "", "on whole steps",
-            "OffroadCondition", _MIRRORED, _off_road,
+            "OffroadCondition", _MIRRORED, _read_off_road,
         ),
         ConditionKind(
             "own", "a `kind` that an installed package gives, with its `values`", "its own",

@@ -150,7 +150,7 @@ class ConditionTree:
         self._step = step
         self._leaves: list[_Leaf] = []
         self._late: list[_Delayed] = []
-        self._root = self._taken_apart(rule.when, self._start, rule.actor)
+        self._root = self._build_node(rule.when, self._start, rule.actor)
 
     def look(self, view: RoadView) -> Flips:
         """When the condition holds from ``view.time`` on, for one step.
@@ -162,14 +162,14 @@ class ConditionTree:
 
     def values(self, seconds: float) -> dict[str, float]:
         """What leaves are about so many seconds after the last look, by their place in the tree."""
-        found = {}
+        values = {}
         for leaf in self._leaves:
             if leaf.flips is None:
                 continue
             value = leaf.now.value_after(leaf.before, seconds / self._step)
             if value is not None:
-                found[leaf.key.removeprefix(self._start).lstrip(".")] = value
-        return found
+                values[leaf.key.removeprefix(self._start).lstrip(".")] = value
+        return values
 
     def forget(self) -> None:
         """Forget the last readings: the rule is not looked at for a while."""
@@ -197,19 +197,20 @@ class ConditionTree:
         for leaf in self._leaves:
             if (kept := leaves.get(leaf.key)) is not None:
                 leaf.before = leaf.now = LeafMemory(*kept)
-        for one in self._late:
-            if (past := late.get(one.key)) is not None:
-                one.past = one.now = Flips(past[0], tuple(past[1]))
+        for node in self._late:
+            if (past := late.get(node.key)) is not None:
+                node.past = node.now = Flips(past[0], tuple(past[1]))
 
-    def _taken_apart(self, condition: Condition, where: str, actor: str) -> _Node:
+    def _build_node(self, condition: Condition, where: str, actor: str) -> _Node:
         kind = condition.kind
         part = getattr(condition, kind)
         node: _Node
         if kind == "not_":
-            node = _Negated(self._taken_apart(part, f"{where}.not", actor))
+            node = _Negated(self._build_node(part, f"{where}.not", actor))
         elif kind in ("all", "any"):
             below = [
-                self._taken_apart(one, f"{where}.{kind}[{n}]", actor) for n, one in enumerate(part)
+                self._build_node(child, f"{where}.{kind}[{n}]", actor)
+                for n, child in enumerate(part)
             ]
             node = _Combined(below, every=kind == "all")
         elif (read := condition_kind(condition).read) is None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 STILL = 60.0
 """Seconds for which nobody has moved: longer than most red lights."""
-_SAME = 0.01
+_REPLAY_REST = 0.01
 """Metres within which a replay stays at one place."""
 _TIMED = frozenset({"time", "signal", "own", "not_"})
 """Conditions that can come true although nobody moves, and whoever is there."""
@@ -55,17 +55,17 @@ def story_has_ended(
 def longest_delay(rules: Mapping[str, StoryRule], states: Mapping[str, RuleState]) -> float:
     """Seconds after which a condition that has held may still let one of the rules fire."""
     waiting = (rule for name, rule in rules.items() if states[name].fired < rule.times)
-    return max((_delay_of(rule.when) for rule in waiting), default=0.0)
+    return max((_sum_delays(rule.when) for rule in waiting), default=0.0)
 
 
-def _delay_of(condition: Condition) -> float:
+def _sum_delays(condition: Condition) -> float:
     kind = condition.kind
     parts: tuple[Condition, ...] = ()
     if kind in ("all", "any"):
         parts = getattr(condition, kind)
     elif condition.not_ is not None:
         parts = (condition.not_,)
-    return condition.delay + max(map(_delay_of, parts), default=0.0)
+    return condition.delay + max(map(_sum_delays, parts), default=0.0)
 
 
 def _can_hold(
@@ -98,10 +98,10 @@ def _is_under_way(rule: StoryRule, state: RuleState, now: float) -> bool:
     if state.item is None:
         return False
     parts = rule.then[state.item].parts
-    return not all(_goes_on_for_ever(parts[one.number], one, now) for one in state.running)
+    return not all(_has_no_end(parts[action.number], action, now) for action in state.running)
 
 
-def _goes_on_for_ever(action: Action, running: Running, now: float) -> bool:
+def _has_no_end(action: Action, running: Running, now: float) -> bool:
     """Whether an action has no end of its own, or none of which anything would be seen."""
     if action.keep_gap is not None:
         return running.end == math.inf and not action.keep_gap.once
@@ -110,5 +110,5 @@ def _goes_on_for_ever(action: Action, running: Running, now: float) -> bool:
         rows = action.replay.rows
         passed = sum(row[0] <= now - begin for row in rows)
         left = rows[max(0, passed - 1) :]
-        return all(math.dist(row[1:3], left[0][1:3]) < _SAME for row in left)
+        return all(math.dist(row[1:3], left[0][1:3]) < _REPLAY_REST for row in left)
     return False

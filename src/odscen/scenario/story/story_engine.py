@@ -225,7 +225,7 @@ def _farthest_reach(actor_view: ActorView) -> float:
 
 
 def _quiet_until_reached(part: Reaching, actor: str, view: RoadView) -> float:
-    return _to_point(part.of or actor, view.place(part.place), part.within, view)
+    return _seconds_to_point(part.of or actor, view.place(part.place), part.within, view)
 
 
 def _quiet_until_distance(part: DistanceBounded, actor: str, view: RoadView) -> float:
@@ -233,7 +233,7 @@ def _quiet_until_distance(part: DistanceBounded, actor: str, view: RoadView) -> 
         return 0.0  # along a heading it is another as soon as somebody turns
     name = part.of or actor
     if part.to is None:
-        return _to_point(name, view.place(part.place or ""), part.below, view)
+        return _seconds_to_point(name, view.place(part.place or ""), part.below, view)
     one, other = view.actor(name), view.actor(part.to)
     if one is None or other is None:
         return _quiet_while_absent(view, name, part.to)
@@ -244,7 +244,7 @@ def _quiet_until_distance(part: DistanceBounded, actor: str, view: RoadView) -> 
     )
 
 
-def _to_point(actor: str, point: Point, bound: float, view: RoadView) -> float:
+def _seconds_to_point(actor: str, point: Point, bound: float, view: RoadView) -> float:
     actor_view = view.actor(actor)
     if actor_view is None:
         return _quiet_while_absent(view, actor)
@@ -381,12 +381,12 @@ class StoryEngine:
         for tree in self._looked.values():
             tree.next_step()
         self._looked = {}
-        self._nothing_before = self._until_something(view.time)
+        self._nothing_before = self._find_quiet_end(view.time)
         moves = {}
         for name, channel in sorted(self._channels.items()):
-            if (one := view.actor(name)) is not None:
-                moves[name] = channel.end_step(view.time, self._step, person=one.person)
-                if moves[name] == _FREE and channel.idle and not one.person:
+            if (body := view.actor(name)) is not None:
+                moves[name] = channel.end_step(view.time, self._step, person=body.person)
+                if moves[name] == _FREE and channel.idle and not body.person:
                     del self._channels[name]
         return moves, self._events
 
@@ -395,15 +395,15 @@ class StoryEngine:
         kept = [tree.state() for tree in self._trees.values()]
         return {
             "trees": {
-                "leaves": {key: one for leaves, _ in kept for key, one in leaves.items()},
-                "past": {key: one for _, past in kept for key, one in past.items()},
+                "leaves": {key: memory for leaves, _ in kept for key, memory in leaves.items()},
+                "past": {key: flips for _, past in kept for key, flips in past.items()},
             },
             "quiet": self._quiet.state(),
             "rules": {
                 name: {**asdict(state), "running": [action.state() for action in state.running]}
                 for name, state in self._states.items()
             },
-            "channels": {name: one.state() for name, one in self._channels.items()},
+            "channels": {name: channel.state() for name, channel in self._channels.items()},
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -415,8 +415,10 @@ class StoryEngine:
         for name, kept in state["rules"].items():
             running = [Running.from_state(saved) for saved in kept["running"]]
             self._states[name] = RuleState(**{**kept, "running": running})
-        self._busy = {name for name, one in self._states.items() if one.item is not None}
-        self._channels = {name: Channel.from_state(one) for name, one in state["channels"].items()}
+        self._busy = {name for name, state in self._states.items() if state.item is not None}
+        self._channels = {
+            name: Channel.from_state(saved) for name, saved in state["channels"].items()
+        }
 
     def _begin_step(self, view: RoadView) -> None:
         for name, speed in self._by_story.items():
@@ -447,7 +449,7 @@ class StoryEngine:
                     self._say_event(view.time, FAILED, rule, "it has left the road")
                 self._end_rule(rule, view.time)
 
-    def _until_something(self, time: float) -> float:
+    def _find_quiet_end(self, time: float) -> float:
         """Instant before which nothing can happen if nobody is put elsewhere."""
         if self._channels or self._busy or self._by_story:
             return -math.inf
@@ -527,9 +529,9 @@ class StoryEngine:
             self._end_rule(rule, now)
             return
         for number, action in enumerate(rule.then[state.item].parts):
-            one = Running(number, math.inf)
-            state.running.append(one)
-            self._begin_action(view, now, rule, action, one)
+            begun = Running(number, math.inf)
+            state.running.append(begun)
+            self._begin_action(view, now, rule, action, begun)
             if state.item is None:  # that failed
                 return
 

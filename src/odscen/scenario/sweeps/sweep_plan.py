@@ -341,7 +341,7 @@ def concrete(scenario: Scenario, values: Mapping[str, float], *, name: str) -> S
     try:
         found = with_values(scenario, values)
     except ScenarioError as error:
-        given = ", ".join(f"{one} = {value:g}" for one, value in values.items())
+        given = ", ".join(f"{parameter} = {value:g}" for parameter, value in values.items())
         raise ScenarioError(
             f"{name} ({given}): {error.problem}", problems=error.problems
         ) from error
@@ -356,11 +356,11 @@ def axis_from_text(text: str) -> Range | Table:
     InputError
         If it is none of them.
     """
-    name, sign, said = text.partition("=")
-    name, said = name.strip(), said.strip()
-    if not sign or not name or not said:
+    name, sign, values_text = text.partition("=")
+    name, values_text = name.strip(), values_text.strip()
+    if not sign or not name or not values_text:
         raise InputError(f"{text!r} varies nothing; write gap=1..4:7, gap=1..4 or gap=1,2,4")
-    if (match := _RANGE.fullmatch(said)) is not None:
+    if (match := _RANGE.fullmatch(values_text)) is not None:
         steps = match["steps"]
         return _make_range(
             name,
@@ -368,7 +368,7 @@ def axis_from_text(text: str) -> Range | Table:
             _parse_number(match["high"], text),
             None if steps is None else _parse_number(steps, text),
         )
-    return Table((name,), tuple((_parse_number(part, text),) for part in said.split(",")))
+    return Table((name,), tuple((_parse_number(part, text),) for part in values_text.split(",")))
 
 
 def plan_from_data(data: Mapping[str, Any]) -> SweepPlan:
@@ -392,7 +392,7 @@ def plan_from_data(data: Mapping[str, Any]) -> SweepPlan:
     proposal_kind(method)
     count = None if samples is None else _require_whole(samples, "samples", least=1)
     seed = _require_whole(data.get("seed", 0), "seed", least=0)
-    axes = tuple(_read_axis(one, f"vary[{index}]") for index, one in enumerate(vary))
+    axes = tuple(_read_axis(axis, f"vary[{index}]") for index, axis in enumerate(vary))
     return SweepPlan(axes, method, count, seed)
 
 

@@ -74,18 +74,21 @@ def _child_application(workspace: str) -> FastAPI:
 
 
 async def _answer_request(app: FastAPI, folder: Path) -> None:
-    said = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
+    request = json.loads((folder / REQUEST).read_text(encoding="utf-8"))
     body = (folder / BODY).read_bytes()
     scope = {
         "type": "http",
         "http_version": "1.1",
-        "method": said["method"],
-        "path": said["path"],
-        "raw_path": said["path"].encode(),
-        "query_string": said["query"].encode("latin-1"),
+        "method": request["method"],
+        "path": request["path"],
+        "raw_path": request["path"].encode(),
+        "query_string": request["query"].encode("latin-1"),
         "headers": [
             (b"host", b"localhost"),
-            *((name.encode("latin-1"), value.encode("latin-1")) for name, value in said["headers"]),
+            *(
+                (name.encode("latin-1"), value.encode("latin-1"))
+                for name, value in request["headers"]
+            ),
         ],
         "scheme": "http",
         "root_path": "",

@@ -120,11 +120,11 @@ class LargeRun:
         failed: str | None = None
         try:
             self._write_line(f"{name}\n".encode())
-            said = self._read_answer()
-            while "preparing" in said:
-                preparing(said["preparing"])
-                said = self._read_answer()
-            prepared(said["slice_length"])
+            answer = self._read_answer()
+            while "preparing" in answer:
+                preparing(answer["preparing"])
+                answer = self._read_answer()
+            prepared(answer["slice_length"])
             self._live.attach(self._process)
             for message, payload in messages(self._process):
                 self._live.take(message, payload)
@@ -162,14 +162,14 @@ class LargeRun:
         """The next line of the process; its error is raised here."""
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
-        said: dict[str, Any] = json.loads(line) if line else {}
-        if not said or "error" in said:
+        answer: dict[str, Any] = json.loads(line) if line else {}
+        if not answer or "error" in answer:
             words = self._read_log_end()
             self.end()
-            if said:
-                raise error_from_data(said["error"])
+            if answer:
+                raise error_from_data(answer["error"])
             raise ToolError("the process of the run has ended without a result", output=words)
-        return said
+        return answer
 
     def _read_log_end(self) -> str:
         self._log.seek(0)

@@ -22,7 +22,7 @@ from odscen.web.messages import Name, OfferedInfo, ProblemInfo
 from odscen.web.services import Shared
 
 router = APIRouter(prefix="/api")
-_OF_THE_SERVER = frozenset({"address", "program", "python"})
+_SERVER_OPTIONS = frozenset({"address", "program", "python"})
 """Options that whoever starts the server decides."""
 
 
@@ -47,7 +47,7 @@ def list_simulators() -> list[OfferedInfo]:
     """
     rows = []
     for offered in installed_simulators():
-        kept = tuple(option for option in offered.options if option.name not in _OF_THE_SERVER)
+        kept = tuple(option for option in offered.options if option.name not in _SERVER_OPTIONS)
         shipped = offered.name in (CARLA_MIRROR, CARLA_NATIVE, METADRIVE, ESMINI)
         rows.append(OfferedInfo.of(offered._replace(options=kept) if shipped else offered))
     return rows

@@ -42,21 +42,21 @@ def file(run: str, name: str, shared: Shared) -> Response:
 def fit(run: str, shared: Shared) -> RunFit:
     """How well a finished run meets the counts of its scenario."""
     folder = shared.runs.kept.whole(run)
-    found = demands.fit_counts(shared.workspace, folder)
+    fit_report = demands.fit_counts(shared.workspace, folder)
     scenario = read_scenario(folder / SCENARIO_FILE)
     graph = shared.map_of(scenario).sumo.graph
-    points = place_points(graph, [row.place for row in found.rows])
+    points = place_points(graph, [row.place for row in fit_report.rows])
     rows = []
-    for row in found.rows:
+    for row in fit_report.rows:
         x, y = points.get(row.place, (None, None))
         rows.append(FitRow(**row._asdict(), met=row.met, x=x, y=y))
     return RunFit(
         rows=rows,
-        met=sum(row.met for row in found.rows),
-        hours=len(found.hours),
-        hours_met=sum(hour.met for hour in found.hours),
-        rmse=found.rmse,
-        contradictions=list(found.contradictions),
+        met=sum(row.met for row in fit_report.rows),
+        hours=len(fit_report.hours),
+        hours_met=sum(hour.met for hour in fit_report.hours),
+        rmse=fit_report.rmse,
+        contradictions=list(fit_report.contradictions),
     )
 
 

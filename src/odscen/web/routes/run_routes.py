@@ -137,10 +137,10 @@ def page_of_run(shared: Shared, run: str, name: str) -> Response:
 def summary(run: str, shared: Shared) -> RunSummary:
     """Key figures of a finished run: its ``summary.json``."""
     _finished_file(shared, run, layout.SUMMARY_FILE)
-    found = shared.runs.kept.summary(run)
-    if found is None:
+    summary = shared.runs.kept.summary(run)
+    if summary is None:
         raise NotFoundError("summary of run", run, [])
-    return found
+    return summary
 
 
 @router.get("/{run}/content")
@@ -168,9 +168,9 @@ def egos(run: str, shared: Shared) -> RunEgos:
     """What became of the vehicles under test of a finished run."""
     path = _finished_file(shared, run, layout.ACTORS_FILE)
     with _name_run_in_errors(path.parent):
-        found = [ego for ego in actors_from_json(_read_text(path)) if ego.ego]
+        egos = [ego for ego in actors_from_json(_read_text(path)) if ego.ego]
     names = EgoOutcome.model_fields
-    return RunEgos(egos=[EgoOutcome(**{n: getattr(ego, n) for n in names}) for ego in found])
+    return RunEgos(egos=[EgoOutcome(**{n: getattr(ego, n) for n in names}) for ego in egos])
 
 
 @router.get("/{run}/curves")
@@ -183,11 +183,11 @@ def curves(run: str, shared: Shared) -> RunCurves:
     )
     with _name_run_in_errors(path.parent):
         actors = actors_from_json(_read_text(path))
-        found = run_curves(plan, actors, recorded.rows, end=end)
+        table = run_curves(plan, actors, recorded.rows, end=end)
     return RunCurves(
-        counts=RunCurve(**_column_lists(found.counts)),
-        speeds=RunSpeeds(**_column_lists(found.speeds)),
-        shares=RunShares(**_column_lists(found.shares)),
+        counts=RunCurve(**_column_lists(table.counts)),
+        speeds=RunSpeeds(**_column_lists(table.speeds)),
+        shares=RunShares(**_column_lists(table.shares)),
     )
 
 

@@ -200,8 +200,8 @@ def rename(name: str, new: NewName, shared: Shared) -> ScenarioState:
 def problems(name: str, shared: Shared) -> ScenarioProblems:
     """What is wrong with a scenario as it is now."""
     draft = shared.drafts.get(name)
-    found = _problem_infos(shared, draft.scenario)
-    return ScenarioProblems(version=draft.history.version, problems=found)
+    infos = _problem_infos(shared, draft.scenario)
+    return ScenarioProblems(version=draft.history.version, problems=infos)
 
 
 @router.post("/{name}/edits")
@@ -298,9 +298,9 @@ def plan(name: str, request: Request, shared: Shared) -> Response:
     scenario = shared.drafts.get(name).scenario
     sumo, assets = shared.map_of(scenario).sumo, shared.workspace.assets()
     with shared.search:
-        found = planned_positions(scenario, sumo, _region_of_scenario(shared, scenario), assets)
+        positions = planned_positions(scenario, sumo, _region_of_scenario(shared, scenario), assets)
     return answer(
-        request, pack(orjson.dumps(_rounded_columns(found), option=orjson.OPT_SERIALIZE_NUMPY))
+        request, pack(orjson.dumps(_rounded_columns(positions), option=orjson.OPT_SERIALIZE_NUMPY))
     )
 
 

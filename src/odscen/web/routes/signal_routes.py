@@ -34,6 +34,7 @@ from odscen.reports.signal_sheet import legend_picture, legend_shapes
 from odscen.runs import layout
 from odscen.runs.recorded import read_calls, read_light_states
 from odscen.scenario.document.scenario_document import Scenario
+from odscen.scenario.document.signals_document import Control
 from odscen.scenario.edits.turn_treatment import crossing_turns
 from odscen.scenario.signals.light import find_light, shortest_names
 from odscen.scenario.signals.program_design import seconds_of_day
@@ -77,6 +78,8 @@ if TYPE_CHECKING:
 
 router = APIRouter(prefix="/api", route_class=LargeDocumentRoute)
 
+_CONTROLS: dict[str, Control] = {"extended": "extended", "actuated": "actuated"}
+"""Controls that are not fixed-time, by what runs say."""
 _WIDTH = 384.0
 """Pixels of a time bar."""
 
@@ -143,13 +146,17 @@ def webster(name: str, wish: WebsterWish, shared: Shared) -> TimedSignalsState:
 def corridor(name: str, wish: CorridorWish, shared: Shared) -> TimedSignalsState:
     """Coordinate lights: one cycle, and the offsets with the widest bands."""
     scenario = shared.drafts.get(name).scenario
-    found = coordinate_signals(
+    coordination = coordinate_signals(
         shared.workspace, scenario, junctions=wish.junctions, along=wish.along,
         favoured=wish.favoured, speed=wish.speed, cycle=wish.cycle,
     )  # fmt: skip
-    draft = shared.drafts.change(name, wish.version, "Coordinate lights", lambda _: found.scenario)
+    draft = shared.drafts.change(
+        name, wish.version, "Coordinate lights", lambda _: coordination.scenario
+    )
     return TimedSignalsState(
-        state=state_of(shared, draft), notes=list(found.to_words()), picture=found.to_svg()
+        state=state_of(shared, draft),
+        notes=list(coordination.to_words()),
+        picture=coordination.to_svg(),
     )
 
 
@@ -226,7 +233,7 @@ def _program_info(
     return LightProgramInfo(
         id=light.id,
         junctions=list(light.junctions),
-        control="actuated" if light.control == "actuated" else "fixed",
+        control=_CONTROLS.get(light.control, "fixed"),
         origin=program_origin(light, scenario.signals, converter),
         groups=[
             LightGroupInfo(
@@ -276,12 +283,12 @@ def _editable_fields(
     )
     group_of = {n: group.id for group in light.groups for n in group.links}
     names: dict[str, MovementInfo] = {}
-    for n, one in enumerate(view.movements):
-        if not one.turn:
+    for n, movement in enumerate(view.movements):
+        if not movement.turn:
             continue
         # Turns of an approach are told apart; where one leads to several roads, these are.
         for name in shortest_names(_movements_alike(n, view), view.movements):
-            known = MovementInfo(name=name, walk=one.walk, group=group_of.get(n, ""))
+            known = MovementInfo(name=name, walk=movement.walk, group=group_of.get(n, ""))
             names.setdefault(name, known)
     return {
         "turns": _turn_infos(light, view),
@@ -301,11 +308,12 @@ def _editable_fields(
 
 def _movements_alike(movement: int, view: Light) -> set[int]:
     """Movements that turn as one does, from the same approach into the same road."""
-    one = view.movements[movement]
+    movement_view = view.movements[movement]
     return {
         n
         for n, other in enumerate(view.movements)
-        if (other.approach, other.exit, other.turn) == (one.approach, one.exit, one.turn)
+        if (other.approach, other.exit, other.turn)
+        == (movement_view.approach, movement_view.exit, movement_view.turn)
     }
 
 
@@ -338,7 +346,7 @@ def _plan_info(
     drawn = {stage.stage.begin: stage for stage in pictures.stages(plan)}
     stages = []
     for stage in stage_spans(plan):
-        one = drawn.get(stage.begin)
+        drawn_stage = drawn.get(stage.begin)
         stages.append(
             StageInfo(
                 id=stage.id,
@@ -351,7 +359,7 @@ def _plan_info(
                 groups=list(stage.groups(light)),
                 permissive=list(stage.groups(light, "g")),
                 words=stage_words(stage),
-                picture="" if one is None else str(one.picture),
+                picture="" if drawn_stage is None else str(drawn_stage.picture),
             )
         )
     return DayPlanInfo(
@@ -404,8 +412,8 @@ def _detector_calls(light: LightProgram, folder: Path) -> _Calls:
     table = read_calls(folder)
     if table is None:
         return {}
-    found: _Calls = {}
+    calls: _Calls = {}
     own = table.filter(pl.col("detector").is_in([detector.id for detector in light.detectors]))
     for detector, begin, end in own.select("detector", "begin", "end").iter_rows():
-        found.setdefault(detector, []).append((begin, end))
-    return found
+        calls.setdefault(detector, []).append((begin, end))
+    return calls

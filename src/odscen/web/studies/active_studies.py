@@ -224,7 +224,7 @@ class Studies:
 
 def _plan_of_wish(wish: StudyWish) -> StudyPlan:
     runs = {} if wish.until is None else {"until": wish.until}
-    said = {
+    data = {
         "name": wish.name or wish.scenarios[0],
         "scenarios": [
             f"{check_name(scenario, what='scenario')}{SUFFIX}" for scenario in wish.scenarios
@@ -236,7 +236,7 @@ def _plan_of_wish(wish: StudyWish) -> StudyPlan:
         ],
         "run": runs,
     }
-    return validated(StudyPlan, said)
+    return validated(StudyPlan, data)
 
 
 def _status_of_study(

@@ -102,10 +102,10 @@ def file(study: str, name: str, shared: Shared) -> Response:
 
 
 def _figure_info(name: str) -> StudyFigure:
-    found = run_figure(name)
-    if found is None:
+    entry = run_figure(name)
+    if entry is None:
         return StudyFigure(name=name, label=name, unit="")
-    return StudyFigure(name=name, label=found.label, unit=found.unit, better=found.better)
+    return StudyFigure(name=name, label=entry.label, unit=entry.unit, better=entry.better)
 
 
 def _figure_groups(groups: Sequence[StudyGroup], figure: str) -> list[FigureGroup]:

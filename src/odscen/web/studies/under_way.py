@@ -78,7 +78,7 @@ class OneAtATime:
     def start(self, name: str, before: int, work: Callable[[UnderWay], None]) -> None:
         """Start work of which so many runs had ended; it calls ``check`` now and then."""
         known = self._known[name] = UnderWay(time.monotonic(), before, before)
-        self._pool.submit(_carried_out, known, work)
+        self._pool.submit(_carry_out_work, known, work)
 
     def known(self, name: str) -> UnderWay | None:
         """What this server has started by that name, over or not."""
@@ -111,7 +111,7 @@ class OneAtATime:
             time.sleep(0.02)
 
 
-def _carried_out(known: UnderWay, work: Callable[[UnderWay], None]) -> None:
+def _carry_out_work(known: UnderWay, work: Callable[[UnderWay], None]) -> None:
     try:
         work(known)
     except StoppedWork:

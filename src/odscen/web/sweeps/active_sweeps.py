@@ -73,7 +73,7 @@ class Sweeps:
         count, tried = len(plan.cases()), estimate(
             self._workspace, scenario, plan, settings=settings
         )  # fmt: skip
-        processes = _at_most(wish.processes)
+        processes = _limit_processes(wish.processes)
         return PlannedSweep(
             cases=count,
             tried=tried.case,
@@ -123,14 +123,14 @@ class Sweeps:
             If it is driven by code that only its folder names.
         """
         folder = self._folder_of(name)
-        scenario, plan, said = read_sweep(folder)
+        scenario, plan, description = read_sweep(folder)
         with self._work.lock:
             self._work.refuse_more()
             if _is_whole(folder):
                 raise ConflictError(
                     f"sweep {name!r} has all of its cases; there is nothing to resume"
                 )
-            settings = settings_from_dict(said)
+            settings = settings_from_dict(description)
             if settings.behaviour is not None and not is_installed(settings.behaviour):
                 raise InputError(
                     f"sweep {name!r} is driven by code that its folder names, "
@@ -211,12 +211,12 @@ class Sweeps:
         NotFoundError
             If there is no such sweep, or file, or it is not one for download.
         """
-        found = self._folder_of(name) / path
-        if not _FILES.fullmatch(path) or not found.is_file():
+        file = self._folder_of(name) / path
+        if not _FILES.fullmatch(path) or not file.is_file():
             raise NotFoundError(f"file of sweep {name!r}", path, [])
         if not path.startswith("runs/"):  # a run has checksums of its own
-            check_files(found.parents[path.count("/")], only=(path,))
-        return found
+            check_files(file.parents[path.count("/")], only=(path,))
+        return file
 
     def case(self, name: str, case: str) -> Scenario:
         """One case as a scenario of numbers that runs alone as it did in the sweep.
@@ -240,7 +240,7 @@ class Sweeps:
         settings: SweepSettings,
         processes: int,
     ) -> None:
-        folder, processes = self._folder / name, _at_most(processes)
+        folder, processes = self._folder / name, _limit_processes(processes)
 
         def work(known: UnderWay) -> None:
             def done(ended: int, _count: int) -> None:
@@ -283,7 +283,7 @@ def _settings_of_wish(wish: SweepWish) -> SweepSettings:
     return SweepSettings(wish.safe, wish.figures, seed=wish.seed)
 
 
-def _at_most(processes: int) -> int:
+def _limit_processes(processes: int) -> int:
     """No more at a time than the machine has cores."""
     return min(processes, os.cpu_count() or 1)
 

@@ -62,7 +62,7 @@ def changes_between(before: Scenario, after: Scenario) -> list[DocumentChange]:
 
     Parts that both have as the same object take no time, as edits leave them.
     """
-    found: list[DocumentChange] = []
+    changes: list[DocumentChange] = []
     for name in type(before).model_fields:
         old, new = getattr(before, name), getattr(after, name)
         if old is new or old == new:
@@ -71,8 +71,8 @@ def changes_between(before: Scenario, after: Scenario) -> list[DocumentChange]:
             # As the document writes it: a part alone may be written otherwise.
             pair = (before, after)
             old, new = (document.model_dump(mode="json", include={name})[name] for document in pair)
-        found += _list_changes(old, new, f"/{name}")
-    return found
+        changes += _list_changes(old, new, f"/{name}")
+    return changes
 
 
 def _list_changes(before: Any, after: Any, path: str) -> Iterator[DocumentChange]:

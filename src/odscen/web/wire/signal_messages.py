@@ -152,7 +152,7 @@ class LightProgramInfo(Answer):
 
     id: str
     junctions: list[str]
-    control: Literal["fixed", "actuated"]
+    control: Literal["fixed", "extended", "actuated"]
     origin: ProgramOrigin
     groups: list[LightGroupInfo]
     plans: list[DayPlanInfo]

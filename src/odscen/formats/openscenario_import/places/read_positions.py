@@ -316,14 +316,14 @@ class PositionReader:
         lane = self.report.number(kind, "laneId")
         offset = self.side * self.report.number(kind, "offset", 0.0)
         node = self._find_node(road, int(lane), s)
-        walk = self._on_foot(road, int(lane), s) if node is None else None
+        walk = self._place_on_walk(road, int(lane), s) if node is None else None
         if walk is not None:
             return walk.moved(0.0, offset if lane < 0 else -offset)
         if node is None:
-            return self._on_any_lane(kind, road, int(lane), s, offset)
+            return self._place_on_any_lane(kind, road, int(lane), s, offset)
         return self._point_at_node(node, s, offset)
 
-    def _on_any_lane(
+    def _place_on_any_lane(
         self, kind: _Element, road: str, lane: int, s: float, offset: float
     ) -> MapPoint:
         """Middle of a lane that is neither to drive nor to walk on, such as a shoulder."""
@@ -334,7 +334,7 @@ class PositionReader:
         point = MapPoint(*found)
         return point if lane <= 0 else point._replace(hdg=point.hdg + math.pi)
 
-    def _on_foot(self, road: str, lane: int, s: float) -> MapPoint | None:
+    def _place_on_walk(self, road: str, lane: int, s: float) -> MapPoint | None:
         """Centre of a lane for walking; right lanes lead with growing s, left ones against it."""
         walks = self.graph.walks
         rows = [
@@ -351,7 +351,7 @@ class PositionReader:
         at = at.moved(s - float(walks.s[node]))
         return at if lane < 0 else at._replace(hdg=hdg + math.pi)
 
-    def _on_road(self, kind: _Element, road: str, s: float, t: float) -> MapPoint:
+    def _place_on_road(self, kind: _Element, road: str, s: float, t: float) -> MapPoint:
         found = self.road_point(road, s, t)
         if found is None:
             raise RefusedError(kind, f"the map has no road {road!r}")
@@ -360,7 +360,7 @@ class PositionReader:
 
     def _read_road_position(self, kind: _Element) -> MapPoint:
         s, t = self.report.number(kind, "s"), self.report.number(kind, "t", 0.0)
-        return self._on_road(kind, self.report.word(kind, "roadId"), s, t)
+        return self._place_on_road(kind, self.report.word(kind, "roadId"), s, t)
 
     def _base_node(self, kind: _Element) -> int:
         base = self.of_entity(kind)
@@ -423,16 +423,16 @@ class PositionReader:
         lanes = self.graph.lanes
         key = lanes.lanes.keys[int(lanes.lane[there.node])]
         if inside.tag == "FromLaneCoordinates":
-            return self._in_lane(inside, there)
+            return self._place_in_lane(inside, there)
         t = self.side * self.report.number(inside, "t", 0.0)
         ahead = self.ahead_of(there.node, there)
         forward = bool(lanes.lanes.forward[int(lanes.lane[there.node])])
         s = float(lanes.s[there.node]) + (ahead if forward else -ahead)
-        found = self._on_road(kind, key.road, s, t)
+        found = self._place_on_road(kind, key.road, s, t)
         against = math.cos(found.hdg - there.hdg) < 0.0  # who follows the route looks along it
         return found._replace(hdg=found.hdg + math.pi) if against else found
 
-    def _in_lane(self, inside: _Element, at: MapPoint) -> MapPoint:
+    def _place_in_lane(self, inside: _Element, at: MapPoint) -> MapPoint:
         """Where a point lies on the lane of a road whose id an element gives, and its offset."""
         node, lanes = at.node or 0, self.graph.lanes
         key = lanes.lanes.keys[int(lanes.lane[node])]

@@ -108,16 +108,16 @@ def _points_from(points: list[TrajectoryPoint], metres: float) -> list[Trajector
 def _read_polyline(
     report: ImportReport, positions: PositionReader, shape: _Element
 ) -> list[TrajectoryPoint]:
-    found: list[TrajectoryPoint] = []
+    points: list[TrajectoryPoint] = []
     turned: list[bool] = []
     for vertex in report.children(shape, "Vertex"):
         place = _required_position(report, vertex, "Position")
         at = positions.point(place)
         turned.append(place.find("*/Orientation") is not None or place.find("*[@h]") is not None)
-        found.append(TrajectoryPoint(report.number(vertex, "time", 0.0), at))
+        points.append(TrajectoryPoint(report.number(vertex, "time", 0.0), at))
     return [
-        one if own else one._replace(at=one.at._replace(hdg=_direction_at(found, row)))
-        for row, (one, own) in enumerate(zip(found, turned, strict=True))
+        point if own else point._replace(at=point.at._replace(hdg=_direction_at(points, row)))
+        for row, (point, own) in enumerate(zip(points, turned, strict=True))
     ]
 
 
@@ -152,14 +152,14 @@ def _clothoid_spline(
     segments = list(report.children(shape, "ClothoidSplineSegment"))
     ends = [report.number(segment, "timeStart", 0.0) for segment in segments[1:]]
     ends.append(report.number(shape, "timeEnd", 0.0))
-    found: list[TrajectoryPoint] = []
+    trajectory_points: list[TrajectoryPoint] = []
     worst = 0.0
     for segment, end in zip(segments, ends, strict=True):
         place = report.child(segment, "PositionStart")
         if place is not None:
             start = positions.point(place)
-        elif found:
-            start = found[-1].at
+        elif trajectory_points:
+            start = trajectory_points[-1].at
         else:
             start = positions.itself(segment)
         turn = positions.side * report.number(segment, "hOffset", 0.0)
@@ -172,9 +172,9 @@ def _clothoid_spline(
         points = _sample_spiral(start, length, bends[0], bends[1])
         worst = max(worst, _sagitta_of_arc(length, max(abs(bend) for bend in bends)))
         more = _time_points(points, report.number(segment, "timeStart", 0.0), end)
-        found += more[1:] if found and place is None else more
+        trajectory_points += more[1:] if trajectory_points and place is None else more
     _note_approximation(report, shape, worst)
-    return found
+    return trajectory_points
 
 
 def _read_nurbs(

@@ -45,11 +45,11 @@ def with_parameters(
     reached: set[Source] = set()
     document = with_formulas(data, reached)
     made: dict[str, Made] = {}
-    for name, one in declared.items():
-        made[name] = _read_parameter(report, one, frozenset(made))
+    for name, declaration in declared.items():
+        made[name] = _read_parameter(report, declaration, frozenset(made))
     used = frozenset().union(*(names_in(report.formulas[place]) for place in reached))
     kept = _with_needed(made, used)
-    document["parameters"] = {name: one for name, one in made.items() if name in kept}
+    document["parameters"] = {name: parameter for name, parameter in made.items() if name in kept}
     for name, element in declared.items():
         _report_kept_value(report, name, element, reached, kept=name in kept)
     return computed(document) if kept else document
@@ -102,12 +102,12 @@ def _report_kept_value(
 ) -> None:
     """Say where a parameter keeps its declared value."""
     fixed = [
-        f"{report.place(one)} ({key})"
-        for (one, key), names in report.uses.items()
+        f"{report.place(element)} ({key})"
+        for (element, key), names in report.uses.items()
         if name in names
-        and (one, key) not in reached
-        and one.tag not in _MENTIONED
-        and report.verdict(one) in ("taken", "approximated")
+        and (element, key) not in reached
+        and element.tag not in _MENTIONED
+        and report.verdict(element) in ("taken", "approximated")
     ]
     if fixed:
         words = f"its declared value stays, whatever a sweep gives it: {', '.join(fixed)}"

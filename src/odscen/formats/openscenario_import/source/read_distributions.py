@@ -140,18 +140,18 @@ class _DistributionReader:
         if not 1 <= count <= MOST_CASES:
             raise self.report.wrong(group, f"{count} test runs; 1 to {MOST_CASES:,} are possible")
         columns: dict[str, list[float]] = {}
-        for index, one in enumerate(self.report.children(group, "StochasticDistribution")):
-            name = self.report.word(one, "parameterName").lstrip("$")
-            if not self._is_known(one, name):
+        for index, distribution in enumerate(self.report.children(group, "StochasticDistribution")):
+            name = self.report.word(distribution, "parameterName").lstrip("$")
+            if not self._is_known(distribution, name):
                 continue
             generator = np.random.default_rng([seed, index])
             try:
-                columns[name] = self._draw_column(self.report.only(one), count, generator)
+                columns[name] = self._draw_column(self.report.only(distribution), count, generator)
             except RefusedError as error:
-                self.report.mark(one, "refused", error.reason)
+                self.report.mark(distribution, "refused", error.reason)
                 continue
             words = f"{count} values drawn now, by seed {seed} and numpy's generator"
-            self.report.mark(one, "approximated", words)
+            self.report.mark(distribution, "approximated", words)
         rows = tuple(zip(*columns.values(), strict=True))
         return [Table(tuple(columns), rows)] if columns else []
 
@@ -230,7 +230,7 @@ def _draw_histogram(
     return drawn
 
 
-def _by_weight(
+def _draw_by_weight(
     read: _DistributionReader, kind: _Element, count: int, generator: Generator
 ) -> FloatArray:
     values = list(read.report.children(kind, "Element"))
@@ -253,7 +253,7 @@ DRAWS: Final[
     "NormalDistribution": _draw_normal,
     "PoissonDistribution": _draw_poisson,
     "Histogram": _draw_histogram,
-    "ProbabilityDistributionSet": _by_weight,
+    "ProbabilityDistributionSet": _draw_by_weight,
 }
 """How values of stochastic distributions are drawn."""
 

@@ -59,7 +59,7 @@ class AppearanceReader:
     def read(self, board: _Element, names: Iterable[str]) -> None:
         """Fill in the starts of the entities of these names, as far as the file has some."""
         for about in board.iterfind("Init/Actions/GlobalAction/EntityAction"):
-            self._at_first(about)
+            self._take_first_position(about)
         for name in names:
             if name in self.positions.starts:
                 continue
@@ -67,7 +67,7 @@ class AppearanceReader:
                 self._put_entity(name, place)
                 break
 
-    def _at_first(self, about: _Element) -> None:
+    def _take_first_position(self, about: _Element) -> None:
         name = about.get("entityRef", "")
         parent = about.getparent()
         for element in (about, *(() if parent is None else (parent,)), *about):
@@ -226,7 +226,7 @@ class ActorPlaces:
             points = [positions.point_along(node, begin + metres, left) for metres in steps]
             bends = [a.hdg != b.hdg for a, b in itertools.pairwise(points)]
             points = [*itertools.compress(points, bends), points[-1]]
-        return {"path": {"points": [[round(one.x, 4), round(one.y, 4)] for one in points]}}
+        return {"path": {"points": [[round(point.x, 4), round(point.y, 4)] for point in points]}}
 
     def aside(self, entity: ReadEntity, centre: MapPoint, *, led: bool) -> float:
         """Metres to the left of the nearest lane that leads its way, 0 on a lane.
@@ -497,7 +497,7 @@ class InitReader:
                 self._places.leave_room(entity, made, {str(actor["spawn"]) for actor in found})
             found.append(made)
             self.placed.add(entity.id)
-        for name in [n for n, one in self._entities.items() if one.id not in self.placed]:
+        for name in [n for n, entity in self._entities.items() if entity.id not in self.placed]:
             del self._entities[name]  # events and conditions that name it are refused
         return found
 
@@ -542,7 +542,7 @@ class InitReader:
     ) -> dict[str, Any]:
         centre = start.moved(entity.ahead)
         then = self._then.get(entity.id, [])
-        each = [one for action in then for one in action.get(FOLLOWING, [action])]
+        each = [follower for action in then for follower in action.get(FOLLOWING, [action])]
         changes = [action["speed"] for action in each if "speed" in action]
         speed = changes[-1]["to"] if changes else 0.0
         kept = [action["keep_gap"]["to"] for action in then if "keep_gap" in action]

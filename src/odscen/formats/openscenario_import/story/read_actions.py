@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 def start_of(conditions: ConditionReader, actor: str) -> MapPoint | None:
     """Where an actor starts, as the file has it."""
     entities, starts = conditions.entities, conditions.positions.starts
-    return next((starts.get(name) for name, one in entities.items() if one.id == actor), None)
+    return next((starts.get(name) for name, entity in entities.items() if entity.id == actor), None)
 
 
 def start_lane(conditions: ConditionReader, element: _Element, actor: str) -> tuple[str, int, int]:
@@ -158,7 +158,7 @@ class ActionReader:
         """
         report = self.conditions.report
         kind = report.only(element)
-        if self.own and (made := _given_back(element, entity)):
+        if self.own and (made := _read_release(element, entity)):
             report.take(element)
             return [made]
         if not self.own and (made := _switch_of_driver(report, kind, entity)):
@@ -171,7 +171,11 @@ class ActionReader:
         make = _MAKERS.get(str(kind.tag))
         if make is None:
             raise RefusedError(kind, f"odscen has no {kind.tag}")
-        names = [name for name, one in self.conditions.entities.items() if one is entity]
+        names = [
+            name
+            for name, known_entity in self.conditions.entities.items()
+            if known_entity is entity
+        ]
         if kind.tag == "TeleportAction" and stays(report, kind, names):
             return []
         if kind.tag == "TeleportAction" and lines_up(report, kind, names):
@@ -201,7 +205,7 @@ class ActionReader:
         return min(max(value, 0.0), 100.0)
 
 
-def _given_back(element: _Element, entity: ReadEntity) -> Made | None:
+def _read_release(element: _Element, entity: ReadEntity) -> Made | None:
     """What gives speed, or all, back to SUMO, or to the story alone."""
     kind = next(element.iter("ActivateControllerAction"), None)
     if kind is None or kind.get("longitudinal") is None:
@@ -306,7 +310,7 @@ def _read_lane(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made:
     if lane.tag == "RelativeTargetLane":
         other = read.conditions.actor(lane)
         if other == entity.id and value:
-            return _to_own_neighbour(read, lane, entity, value, how | _named_offset(beyond))
+            return _change_from_own_lane(read, lane, entity, value, how | _named_offset(beyond))
         if other != entity.id and value == 0:
             if beyond:
                 report.mark(kind, "approximated", "to the middle of another lane, not beside it")
@@ -353,7 +357,7 @@ def _named_offset(metres: float) -> Made:
     return {"offset": metres} if metres else {}
 
 
-def _to_own_neighbour(
+def _change_from_own_lane(
     read: ActionReader, lane: _Element, entity: ReadEntity, by: int, how: Made
 ) -> Made:
     """Change of so many lanes from its own one; beside it if that is the opposite one."""
@@ -378,7 +382,7 @@ def _to_own_neighbour(
 def _within_lane(read: ActionReader, kind: _Element, entity: ReadEntity, how: Made) -> Made:
     """Change of no lanes: to the middle of its own, or beside it."""
     metres = read.conditions.report.number(kind, "targetLaneOffset", 0.0)
-    metres += _beside_at_first(read, entity)[0]
+    metres += _measure_first_offset(read, entity)[0]
     read.offsets[entity.id] = metres
     return {"offset": {"to": metres, **how}}
 
@@ -396,7 +400,7 @@ def _read_offset(read: ActionReader, kind: _Element, entity: ReadEntity) -> Made
         metres += base
         words = f"counted from {base:.2f} m, the offset at which {to.get('entityRef')!r} starts"
         report.mark(to, "approximated", words)
-    named, start = _beside_at_first(read, entity)
+    named, start = _measure_first_offset(read, entity)
     metres += named
     moves = metres - read.offsets.get(entity.id, start)
     read.offsets[entity.id] = metres
@@ -453,7 +457,7 @@ def _read_limited_time(read: ActionReader, kind: _Element, moves: float) -> floa
     return float(max(round(max(seconds), 3), 0.1)) if seconds else USUAL_MOVE
 
 
-def _beside_at_first(read: ActionReader, entity: ReadEntity) -> tuple[float, float]:
+def _measure_first_offset(read: ActionReader, entity: ReadEntity) -> tuple[float, float]:
     """Metres to the left of its lane at which the lane is that the file names, and itself."""
     positions = read.conditions.positions
     if entity.own is not None:  # of which the lane is that of its node, wherever it appears

@@ -52,11 +52,11 @@ def arriving(
         found[field_name] = conditions.point_or_node(place, ahead=ahead)
     words = "how its speed goes on the way is not in the standard: players differ by up to 1 m"
     report.mark(kind, "approximated", words)
-    found |= _on_arrival(conditions.report, kind, conditions.entities[name].id, speeds)
+    found |= _read_arrival_speed(conditions.report, kind, conditions.entities[name].id, speeds)
     return {"arrive": {**found, "to": conditions.entities[name].id}}
 
 
-def _on_arrival(
+def _read_arrival_speed(
     report: ImportReport, kind: _Element, other: str, speeds: Mapping[str, float]
 ) -> Made:
     """Speed on arrival, and the metres before the place at which it is reached."""

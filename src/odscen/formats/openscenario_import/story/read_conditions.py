@@ -93,17 +93,17 @@ class ConditionReader:
         if content is None:
             raise RefusedError(element, "a condition without content")
         if content.tag == "ByValueCondition":
-            made = self._by_value(self.report.only(content))
+            made = self._read_value_condition(self.report.only(content))
         else:
-            made = self._by_entity(content)
+            made = self._read_entity_condition(content)
         return self._add_edge_and_delay(element, made)
 
     def _add_edge_and_delay(self, element: _Element, made: Made) -> Made:
         edge, delay = element.get("conditionEdge", "none"), self.report.number(element, "delay", 0)
-        made = _at_edge(made, edge)
+        made = _read_edge(made, edge)
         return {**made, "delay": delay} if delay > 0 else made
 
-    def _by_value(self, kind: _Element) -> Made:
+    def _read_value_condition(self, kind: _Element) -> Made:
         if kind.tag == "SimulationTimeCondition":
             after: Made = {"time": {"after": max(0.0, self.report.number(kind, "value"))}}
             return {"not": after} if kind.get("rule", "").startswith("less") else after
@@ -151,7 +151,7 @@ class ConditionReader:
             return ALWAYS
         return joined("any", [{"not": joined("any", unsets)}, *sets])
 
-    def _by_entity(self, element: _Element) -> Made:
+    def _read_entity_condition(self, element: _Element) -> Made:
         who = self.report.child(element, "TriggeringEntities")
         body = self.report.child(element, "EntityCondition")
         if who is None or body is None:
@@ -225,7 +225,7 @@ class ConditionReader:
         return node or [round(point.x, 4), round(point.y, 4)]
 
 
-def _at_edge(made: Made, edge: str) -> Made:
+def _read_edge(made: Made, edge: str) -> Made:
     """Condition that holds at an edge of another one.
 
     What stays so once it has come true, times and ends of rules, has a rising edge when it comes
@@ -275,9 +275,9 @@ def _says_heading(position: _Element) -> bool:
 def joined(kind: str, parts: list[Made]) -> Made:
     """Combine conditions, each once; one alone stays as it is."""
     rest = [
-        one
-        for row, one in enumerate(parts)
-        if (kind != "all" or one != ALWAYS) and one not in parts[:row]
+        part
+        for row, part in enumerate(parts)
+        if (kind != "all" or part != ALWAYS) and part not in parts[:row]
     ]
     if not rest:
         return ALWAYS
@@ -331,7 +331,7 @@ def _reference_points(read: ConditionReader, of: str, to: str = "") -> Made:
     """How far the reference points of entities lie behind their centres, where they do."""
     if read.own:  # which writes distances of centres
         return {}
-    ahead = {one.id: float(one.ahead) for one in read.entities.values()}
+    ahead = {entity.id: float(entity.ahead) for entity in read.entities.values()}
     behind = [round(ahead.get(name, 0.0), 4) for name in (of, to)]
     return {"behind": behind} if any(abs(metres) > _SAME_AXLE for metres in behind) else {}
 
@@ -380,7 +380,7 @@ def _read_touched(read: ConditionReader, kind: _Element, of: str) -> Made:
     return {"touched": {"of": of}}
 
 
-def _off_road(read: ConditionReader, kind: _Element, of: str) -> Made:
+def _read_off_road(read: ConditionReader, kind: _Element, of: str) -> Made:
     delay = read.report.number(kind, "duration", 0.0)
     return {"off_road": {"of": of}, **({"delay": delay} if delay > 0 else {})}
 
@@ -388,7 +388,7 @@ def _off_road(read: ConditionReader, kind: _Element, of: str) -> Made:
 def _road_end(read: ConditionReader, kind: _Element, of: str) -> Made:
     """Near to where the lanes end that lead straight on from where the actor starts."""
     positions, delay = read.positions, read.report.number(kind, "duration", 0.0)
-    entity = next(name for name, one in read.entities.items() if one.id == of)
+    entity = next(name for name, entity in read.entities.items() if entity.id == of)
     if entity not in positions.starts:
         raise RefusedError(kind, f"the end of the road of {entity!r}, which has no place")
     start = positions.starts[entity]
@@ -413,6 +413,6 @@ _KINDS: Final[Mapping[str, Callable[[ConditionReader, _Element, str], Made]]] = 
     "RelativeDistanceCondition": _relative_distance,
     "DistanceCondition": _read_distance,
     "CollisionCondition": _read_touched,
-    "OffroadCondition": _off_road,
+    "OffroadCondition": _read_off_road,
     "EndOfRoadCondition": _road_end,
 }

@@ -76,7 +76,9 @@ def followed(conditions: ConditionReader, kind: _Element, entity: ReadEntity) ->
     report, positions = conditions.report, conditions.positions
     front = 0.0 if entity.category is Category.PEDESTRIAN else entity.ahead + entity.length / 2
     entities = conditions.entities
-    own = next((name for name, one in entities.items() if one is entity), entity.id)
+    own = next(
+        (name for name, known_entity in entities.items() if known_entity is entity), entity.id
+    )
     frame = MovingFrame(report, MapPoint(0.0, 0.0, 0.0), positions.side, own)
     with positions.exactly(frame):
         found = read_trajectory(report, positions, kind)

@@ -115,5 +115,5 @@ def _colour_of_state(state: str) -> str:
     lamps = [part.strip().lower() for part in state.split(";")]
     if not lamps or any(lamp not in ("on", "off") for lamp in lamps) or len(lamps) == 1:
         return state.strip().lower()
-    lit = [colour for colour, one in zip(_LAMPS, lamps, strict=False) if one == "on"]
+    lit = [colour for colour, lamp in zip(_LAMPS, lamps, strict=False) if lamp == "on"]
     return lit[0] if lit else "off"

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from odscen.base.errors import InputError, ScenarioError
 from odscen.formats.openscenario_import.import_report import RefusedError
 from odscen.formats.openscenario_import.source.own_files import said_in_properties
 from odscen.formats.openscenario_import.story.global_actions import READ, tell_unread
-from odscen.formats.openscenario_import.story.own_entity_actions import (
-    own_entity_action,
-    with_speed,
-)
 from odscen.formats.openscenario_import.story.read_actions import FOLLOWING
 from odscen.formats.openscenario_import.story.read_conditions import ALWAYS, joined
 from odscen.formats.openscenario_import.story.read_motions import JUMP
@@ -28,6 +24,7 @@ if TYPE_CHECKING:
     from lxml.etree import _Element
 
     from odscen.formats.openscenario_import.import_report import ImportReport
+    from odscen.formats.openscenario_import.places.read_positions import PositionReader
     from odscen.formats.openscenario_import.story.read_actions import ActionReader
     from odscen.formats.openscenario_import.world.read_entities import ReadEntity
     from odscen.scenario.document.scenario_document import Actor
@@ -390,7 +387,7 @@ class StoryReader:
         """
         if then and {"appear", "replay", "offset"} & then[0].keys():
             self._placed.add(actor)
-        put = list(itertools.takewhile(lambda one: {"appear", "replay"} & one.keys(), then))
+        put = list(itertools.takewhile(lambda step: {"appear", "replay"} & step.keys(), then))
         rest = then[len(put) :]
         if put and rest:
             after = rest[0].get(FOLLOWING, rest) if len(rest) == 1 else [{"together": rest}]
@@ -401,3 +398,42 @@ class StoryReader:
         for rule in made:
             refuse_beyond_bounds(StoryRule, {"id": "init", **rule}, element)
         self.rules += [{"id": plain_id(f"init-{actor}", self._ids), **rule} for rule in made]
+
+
+# -------------------------------------------------------------------------- files that odscen wrote
+_SAME_PLACE: Final = 1e-3
+"""Metres, radians and m/s."""
+
+
+def own_entity_action(
+    content: _Element, entity: ReadEntity, positions: PositionReader
+) -> Made | None:
+    """``appear`` or ``vanish`` of an actor; ``None`` of another global action."""
+    about = content.find("EntityAction")
+    if about is None or about.get("entityRef") != entity.id:
+        return None
+    if about.find("DeleteEntityAction") is not None:
+        return {"vanish": {}}
+    position = about.find("AddEntityAction/Position")
+    if position is None:
+        return None
+    at, own = positions.point(position).moved(entity.ahead), entity.own or {}
+    start = positions.of_node(own.get("spawn", ""))
+    if start is not None:
+        start = start.moved(
+            float(own.get("longitudinal_offset", 0.0)), float(own.get("lateral_offset", 0.0))
+        )
+        if at.away(start) < _SAME_PLACE and abs(at.hdg - start.hdg) < _SAME_PLACE:
+            return {"appear": {}}
+    return {"appear": {"at": [round(value, 4) for value in (at.x, at.y, at.hdg)]}}
+
+
+def with_speed(then: list[Made], entity: ReadEntity) -> list[Made]:
+    """Actions in which one that appears has the speed that is written beside it."""
+    if len(then) < 2 or "appear" not in then[0]:
+        return then
+    first, *rest = then
+    to = rest[0].get("speed", {}).get("to", 0.0)  # of a pedestrian at 0 a stop
+    if abs(to - ((entity.own or {}).get("initial_speed") or 0.0)) > _SAME_PLACE:
+        first = {"appear": first["appear"] | {"speed": to}}
+    return [first, *rest[1:]]

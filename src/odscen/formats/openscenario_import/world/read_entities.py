@@ -71,7 +71,7 @@ def plain_id(text: str, taken: set[str]) -> str:
 
 def read_entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]:
     """Entities by their name in the file; the ego is the one that is called so, or none."""
-    found: dict[str, ReadEntity] = {}
+    entities: dict[str, ReadEntity] = {}
     taken: set[str] = set()
     group = report.child(root, "Entities")
     for element in () if group is None else report.children(group, "ScenarioObject"):
@@ -82,21 +82,21 @@ def read_entities(report: ImportReport, root: _Element) -> dict[str, ReadEntity]
             continue
         for controller in element.iterchildren("ObjectController"):
             report.ignore(controller, "a controller is a program beside the file; see --ego")
-        one = _read_entity(report, thing, plain_id(name, taken))
-        if one is None:
+        entity = _read_entity(report, thing, plain_id(name, taken))
+        if entity is None:
             report.mark(element, "refused", "its category has no counterpart")
         else:
-            one.controlled = _has_controller(root, element, name)
-            found[name] = one
+            entity.controlled = _has_controller(root, element, name)
+            entities[name] = entity
     if is_own(root):
-        for one in found.values():
-            one.own = own_fields(report, one.element)
-            one.ego = bool(one.own and one.own.get("ego"))
-        return found
-    drivers = [one for name, one in found.items() if EGO.fullmatch(name)]
-    for one in drivers[:1]:
-        one.ego = one.category is not Category.PEDESTRIAN
-    return found
+        for entity in entities.values():
+            entity.own = own_fields(report, entity.element)
+            entity.ego = bool(entity.own and entity.own.get("ego"))
+        return entities
+    drivers = [entity for name, entity in entities.items() if EGO.fullmatch(name)]
+    for driver in drivers[:1]:
+        driver.ego = driver.category is not Category.PEDESTRIAN
+    return entities
 
 
 def _has_controller(root: _Element, entity: _Element, name: str) -> bool:

@@ -117,10 +117,10 @@ def _read_weather(
     clock, day = (None, 0) if time is None else clock_of(report, time)
     runs = time is None or time.get("animation") != "false"
     if own:
-        said = _read_properties(element)
-        if _is_written(report, element, said, weather):
+        properties = _read_properties(element)
+        if _is_written(report, element, properties, weather):
             report.take(element)
-            return ReadEnvironment(said["environment"], said["clock"], day, runs)
+            return ReadEnvironment(properties["environment"], properties["clock"], day, runs)
     found = _Weather(report)
     sky = report.child(element, "Weather")
     if sky is not None:
@@ -145,11 +145,11 @@ def clock_of(report: ImportReport, element: _Element) -> tuple[float, int]:
         If it is no time.
     """
     text = report.word(element, "dateTime")
-    found = _TIME.fullmatch(text.strip())
-    if found is None:
+    match = _TIME.fullmatch(text.strip())
+    if match is None:
         raise report.wrong(element, f"dateTime={text!r} is no date with a time")
-    year, month, date = (int(group) for group in found.groups()[:3])
-    hours, minutes, seconds = int(found[4]), int(found[5]), float(found[6])
+    year, month, date = (int(group) for group in match.groups()[:3])
+    hours, minutes, seconds = int(match[4]), int(match[5]), float(match[6])
     clock = (hours * 60 + minutes) * 60 + seconds
     if not 0 <= clock < _DAY:
         raise report.wrong(element, f"dateTime={text!r} is no time of a day")
@@ -171,18 +171,18 @@ def _read_properties(element: _Element) -> Made:
 def _is_written(
     report: ImportReport,
     element: _Element,
-    said: Made,
+    properties: Made,
     weather: Callable[[str], Mapping[str, float] | None],
 ) -> bool:
     """Whether an element is still the one that odscen writes of what its properties say."""
-    given = said["environment"]
+    given = properties["environment"]
     preset = weather(given.get("preset", "ClearNoon"))
     if preset is None or not isinstance(given.get("parameters", {}), dict):
         return False
     header = element.getroottree().getroot().find("FileHeader")
     minor = 2 if header is None else int(report.number(header, "revMinor", 2.0))
     whole = {**preset, **given.get("parameters", {})}
-    written = environment(whole, said["clock"] or 0.0, Dialect(minor), {})
+    written = environment(whole, properties["clock"] or 0.0, Dialect(minor), {})
     here, there = ([(element.tag, dict(element.attrib)) for element in tree.iter("*")
                     if element.tag not in ("Properties", "Property")]
                    for tree in (element, written))  # fmt: skip
@@ -268,14 +268,14 @@ class _Weather:
     def road(self, road: _Element) -> None:
         """Read ``RoadCondition``: friction below that of a dry road is that of a wet one."""
         report = self._report
-        friction, said = report.number(road, "frictionScaleFactor", 1.0), road.get("wetness")
+        friction, wetness = report.number(road, "frictionScaleFactor", 1.0), road.get("wetness")
         wet = 100.0 * (1.0 - friction) / (1.0 - WET_GRIP)
         if not WET_GRIP <= friction <= 1.0:
             words = f"grip is {WET_GRIP:g} to 1 times that of a dry road"
             report.mark(road, "approximated", words)
         self._set_value("wetness", min(max(wet, 0.0), 100.0))
-        puddles = _WET.get(said or "dry", 0.0) if said != "moist" else 0.0
-        if said is not None and puddles > self.values["wetness"]:
-            report.mark(road, "approximated", f"{said!r} by its friction alone")
+        puddles = _WET.get(wetness or "dry", 0.0) if wetness != "moist" else 0.0
+        if wetness is not None and puddles > self.values["wetness"]:
+            report.mark(road, "approximated", f"{wetness!r} by its friction alone")
             puddles = self.values["wetness"]
         self._set_value("precipitation_deposits", puddles)

@@ -117,34 +117,34 @@ def _report_lanelets(
             continue
         paths = [f"road {place.road} > lane {place.lane}" for place in places]
         speed, origin = speed_of(source, lanelet)
-        said = [f"{lanelet.subtype.replace('_', ' ')}: {LANE_TYPES[lanelet.subtype]}"]
+        facts = [f"{lanelet.subtype.replace('_', ' ')}: {LANE_TYPES[lanelet.subtype]}"]
         if speed is not None:
-            said.append(f"{3.6 * speed:.4g} km/h")
+            facts.append(f"{3.6 * speed:.4g} km/h")
         if len(set(paths)) > 1:
-            said.append(f"also {', '.join(list(dict.fromkeys(paths))[1:5])}")
+            facts.append(f"also {', '.join(list(dict.fromkeys(paths))[1:5])}")
         confidence = 1.0
         if origin == "usual" and speed is not None:
-            said.append("the limit is the usual one of its kind, as none is given")
+            facts.append("the limit is the usual one of its kind, as none is given")
             confidence = 0.6
         if lanelet.tags.get("one_way") == "no" and lanelet.subtype in DRIVEN:
-            said.append("driven both ways: a road for each direction, one on the other")
+            facts.append("driven both ways: a road for each direction, one on the other")
             confidence = 0.5
         if LANE_TYPES[lanelet.subtype] == "sidewalk" and lanelet.tags.get("bicycle") == "yes":
-            said.append("bicycles may use it too, which a sidewalk of OpenDRIVE does not say")
+            facts.append("bicycles may use it too, which a sidewalk of OpenDRIVE does not say")
             confidence = min(confidence, 0.8)
         margins = [built.roads[place.road].fitted.margin for place in places]
         if min(margins) < _FOLDED:
-            said.append("it bends more tightly than it is wide")
+            facts.append("it bends more tightly than it is wide")
             confidence = min(confidence, 0.4)
         if lanelet.id in lost and parts[lanelet.id] > 1:
-            said.append("a part of it in a junction leads nowhere and is left out")
+            facts.append("a part of it in a junction leads nowhere and is left out")
             confidence = min(confidence, 0.5)
         outcome = ElementOutcome.KEPT if confidence == 1.0 else ElementOutcome.GUESSED
         entries.append(
             ReportEntry(
                 outcome,
                 paths[0],
-                f"lanelet {shown_id(lanelet.id)}, {'; '.join(said)}",
+                f"lanelet {shown_id(lanelet.id)}, {'; '.join(facts)}",
                 None if confidence == 1.0 else confidence,
                 lanelet.id,
             )

@@ -296,7 +296,7 @@ def _lanelets_with(things: Furniture, element: RegulatoryElement) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-def _where_to_stop(
+def _find_stop_places(
     things: Furniture,
     lanelet: str,
     lines: dict[str, tuple[RoadId, float]],
@@ -382,7 +382,7 @@ def _add_lights(things: Furniture, lines: dict[str, tuple[RoadId, float]]) -> di
         crossed = []
         for lanelet in _lanelets_with(things, element):
             if lanelet in things.source.lanelets and lanelet in things.built.places:
-                acts += _where_to_stop(things, lanelet, lines, element)
+                acts += _find_stop_places(things, lanelet, lines, element)
             else:
                 crossed.append(lanelet)
         path = f"regulatory element {shown_id(element.id)}"
@@ -478,9 +478,9 @@ def _sign_code(things: Furniture, way: str, element: RegulatoryElement) -> tuple
     text = (tags.get("subtype") or element.tags.get("sign_type") or "").lower()
     if text in _SIGNS:
         return "DE", _SIGNS[text], "-1"
-    found = _CODE.fullmatch(text)
-    if found is not None:
-        return found[1].upper(), found[2], found[3] or "-1"
+    match = _CODE.fullmatch(text)
+    if match is not None:
+        return match[1].upper(), match[2], match[3] or "-1"
     return "OpenDRIVE", text or "-1", "-1"
 
 
@@ -556,19 +556,21 @@ def _add_right_of_way(things: Furniture) -> None:
             signs.append(_add_sign(things, way, element, where, s))
             things.report(ElementOutcome.KEPT, signs[-1], f"a sign {code}", way)
         missing = [ref for refs in roles.values() for ref in refs if ref not in things.built.places]
-        said = f"right of way of {len(roles['right_of_way'])} lanelets over {len(roles['yield'])}"
+        meaning = (
+            f"right of way of {len(roles['right_of_way'])} lanelets over {len(roles['yield'])}"
+        )
         if not count and not signs:
             things.report(
                 ElementOutcome.LOST,
                 path,
-                f"{said}: they do not meet in one junction, and it has no sign",
+                f"{meaning}: they do not meet in one junction, and it has no sign",
                 element.id,
             )
             continue
         things.report(
             ElementOutcome.KEPT,
             path,
-            f"{said}: {count} priorities of connecting roads, {len(signs)} signs"
+            f"{meaning}: {count} priorities of connecting roads, {len(signs)} signs"
             + (f"; without {', '.join(missing)}, which are not on roads" if missing else ""),
             element.id,
         )

@@ -277,15 +277,15 @@ def _cut_groups(network: LaneNetwork) -> None:
         spans = _junction_spans(own, size)
         # Lanes that begin or end at the edge of the map need a road to come from or to go to.
         stub = min(_STUB, _STUB_SHARE * size)
-        if spans[0][0] <= 0.0 and not parting and not _all_linked(group, network.preceding):
+        if spans[0][0] <= 0.0 and not parting and not _are_all_linked(group, network.preceding):
             spans[0] = (stub, max(spans[0][1], 2.0 * stub))
-        if spans[-1][1] >= size and not joining and not _all_linked(group, network.following):
+        if spans[-1][1] >= size and not joining and not _are_all_linked(group, network.following):
             spans[-1] = (min(spans[-1][0], size - 2.0 * stub), size - stub)
         cut.extend(_cut_group(network.source, group, middles[id(group)], spans))
     network.groups = cut
 
 
-def _all_linked(group: Group, links: dict[str, list[str]]) -> bool:
+def _are_all_linked(group: Group, links: dict[str, list[str]]) -> bool:
     return all(links[lanelet.id] for lanelet in group.lanelets)
 
 

@@ -39,8 +39,10 @@ WALKED: Final = frozenset({"walkway", "shared_walkway", "stairs", "pedestrian_la
 
 _MOST_NODES = 2_000_000
 _MGRS = re.compile(r"(\d{1,2})[C-HJ-NP-X][A-HJ-NP-Z]{2}\d*")
-_AGREE = 1.0
+_MOST_DISAGREEMENT = 1.0
 """Metres by which local and geographic coordinates of a file may disagree, less their offset."""
+_SAME_END = 0.1
+"""Metres between ends of bounds that are one line."""
 _SAME_PLACE = 0.01
 """Metres between nodes of different ids that are one place."""
 
@@ -183,20 +185,41 @@ def read_lanelet_file(content: bytes, *, origin: str = "") -> LaneletMap:
                 )
             relations.append((identity, tags, members))
     points, geo_reference, entries = _place_nodes(nodes, origin)
-    found = LaneletMap(points, {}, {}, way_tags, geo_reference=geo_reference, entries=entries)
+    lanelet_map = LaneletMap(points, {}, {}, way_tags, geo_reference=geo_reference, entries=entries)
     for way, refs in ways.items():
         known = tuple(ref for ref in refs if ref in points)
         if len(known) < len(refs):
-            found.lose("line", way, "it names nodes that are not in the file; they are left out")
+            lanelet_map.lose(
+                "line", way, "it names nodes that are not in the file; they are left out"
+            )
         # A node that follows itself adds nothing.
-        found.ways[way] = tuple(
+        lanelet_map.ways[way] = tuple(
             node for k, node in enumerate(known) if k == 0 or node != known[k - 1]
         )
-    add_relations(found, relations)
-    return found
+    add_relations(lanelet_map, relations)
+    return lanelet_map
 
 
-def add_relations(found: LaneletMap, relations: Sequence[Relation]) -> None:
+def share_line(lanelet_map: LaneletMap, own: str, other: str, *, turned: bool) -> None:
+    """Give a way the nodes of another one, the other way round if need be, where both end alike.
+
+    Files have other points along the line that two lanelets share.
+    """
+    line, theirs = lanelet_map.ways[own], lanelet_map.ways.get(other, ())
+    if turned:
+        theirs = theirs[::-1]
+    if len(line) < 2 or len(theirs) < 2:
+        return
+    ends = zip(
+        lanelet_map.line((line[0], line[-1])),
+        lanelet_map.line((theirs[0], theirs[-1])),
+        strict=True,
+    )
+    if all(math.dist(a, b) <= _SAME_END for a, b in ends):
+        lanelet_map.ways[own] = theirs
+
+
+def add_relations(lanelet_map: LaneletMap, relations: Sequence[Relation]) -> None:
     """Add what relations are to a map that has their points and ways.
 
     Raises
@@ -204,20 +227,20 @@ def add_relations(found: LaneletMap, relations: Sequence[Relation]) -> None:
     InputError
         If none of them is a lanelet that can be read.
     """
-    _weld_nodes(found, relations)
+    _weld_nodes(lanelet_map, relations)
     for identity, tags, members in relations:
         kind = tags.get("type", "")
         if kind == "lanelet":
-            _add_lanelet(found, identity, tags, members)
+            _add_lanelet(lanelet_map, identity, tags, members)
         elif kind == "regulatory_element":
-            found.regulatory[identity] = RegulatoryElement(
+            lanelet_map.regulatory[identity] = RegulatoryElement(
                 identity, tags.get("subtype", ""), tags, members
             )
         elif kind == "multipolygon":
-            _add_area(found, identity, tags, members)
+            _add_area(lanelet_map, identity, tags, members)
         else:
-            found.lose("relation", identity, f"its type {shown(kind)} is none of Lanelet2")
-    if not found.lanelets:
+            lanelet_map.lose("relation", identity, f"its type {shown(kind)} is none of Lanelet2")
+    if not lanelet_map.lanelets:
         raise InputError("no lanelet of the file can be read")
 
 
@@ -250,11 +273,11 @@ def _place_nodes(
             ]
         )
         codes = Counter(
-            found[1]
+            match[1]
             for node in ids
-            if (found := _MGRS.fullmatch(nodes[node][2].get("mgrs_code", "")))
+            if (match := _MGRS.fullmatch(nodes[node][2].get("mgrs_code", "")))
         )
-        reference = _reference_of_local(local, degrees, codes)
+        reference = _find_local_reference(local, degrees, codes)
         row = ReportEntry(
             ElementOutcome.KEPT if reference else ElementOutcome.LOST,
             "header > geoReference",
@@ -289,16 +312,16 @@ def _read_number(text: str | None, node: str, name: str, default: float | None =
     return value
 
 
-def _to_utm(lat: float, lon: float) -> tuple[int, float, float]:
+def _project_to_utm(lat: float, lon: float) -> tuple[int, float, float]:
     """Zone of a place, its easting and northing (negative south of the equator), metres."""
     zone = min(60, max(1, int((lon + 180.0) // 6.0) + 1))
-    x, y = _transform_degrees(_zone_reference(zone, 500000.0, 0.0), np.array([[lat, lon]]))[
+    x, y = _transform_degrees(_format_zone_reference(zone, 500000.0, 0.0), np.array([[lat, lon]]))[
         0
     ].tolist()
     return zone, x, y
 
 
-def _zone_reference(zone: int, x_0: float, y_0: float) -> str:
+def _format_zone_reference(zone: int, x_0: float, y_0: float) -> str:
     lon_0 = zone * 6 - 183
     return (
         f"+proj=tmerc +lat_0=0 +lon_0={lon_0} +k=0.9996 +x_0={x_0:.12g} +y_0={y_0:.12g} "
@@ -353,31 +376,35 @@ def projection_at(origin: str) -> tuple[str, str]:
         raise InputError(f"origin {shown(origin)} is not LATITUDE,LONGITUDE") from None
     if not (abs(lat) <= 84.5 and abs(lon) <= 180.0):
         raise InputError(f"origin {shown(origin)} is no place that UTM has")
-    zone, x, y = _to_utm(lat, lon)
-    reference = _zone_reference(zone, round(500000.0 - x, 6), round(-y, 6))
+    zone, x, y = _project_to_utm(lat, lon)
+    reference = _format_zone_reference(zone, round(500000.0 - x, 6), round(-y, 6))
     return reference, f"UTM zone {zone} with x = y = 0 at latitude {lat:g}, longitude {lon:g}"
 
 
-def _reference_of_local(local: FloatArray, degrees: FloatArray, zones: Counter[str]) -> str:
+def _find_local_reference(local: FloatArray, degrees: FloatArray, zones: Counter[str]) -> str:
     """Projection in which the nodes have their local coordinates; empty if there is none."""
     if not np.isfinite(degrees).all() or np.abs(degrees).max() > 180.0:
         return ""
     if np.abs(degrees[:, 0]).max() > 84.5:
         return ""
-    zone = int(zones.most_common(1)[0][0]) if zones else _to_utm(*degrees.mean(axis=0).tolist())[0]
+    zone = (
+        int(zones.most_common(1)[0][0])
+        if zones
+        else _project_to_utm(*degrees.mean(axis=0).tolist())[0]
+    )
     if not 1 <= zone <= 60:
         return ""
-    grid = _transform_degrees(_zone_reference(zone, 500000.0, 0.0), degrees)
+    grid = _transform_degrees(_format_zone_reference(zone, 500000.0, 0.0), degrees)
     shift = np.median(grid - local, axis=0)
     # Squares of MGRS begin at whole kilometres: what is that near to one is one.
     whole = np.round(shift / 1000.0) * 1000.0
-    shift = np.where(np.abs(shift - whole) < _AGREE, whole, shift)
-    if np.abs(grid - local - shift).max() > _AGREE:
+    shift = np.where(np.abs(shift - whole) < _MOST_DISAGREEMENT, whole, shift)
+    if np.abs(grid - local - shift).max() > _MOST_DISAGREEMENT:
         return ""
-    return _zone_reference(zone, round(500000.0 - shift[0], 3), round(-shift[1], 3))
+    return _format_zone_reference(zone, round(500000.0 - shift[0], 3), round(-shift[1], 3))
 
 
-def _weld_nodes(found: LaneletMap, relations: Sequence[Relation]) -> None:
+def _weld_nodes(lanelet_map: LaneletMap, relations: Sequence[Relation]) -> None:
     """Make one of end nodes of bounds that lie within a centimetre of each other."""
     from scipy.spatial import cKDTree
 
@@ -388,22 +415,24 @@ def _weld_nodes(found: LaneletMap, relations: Sequence[Relation]) -> None:
             if tags.get("type") == "lanelet"
             for role in ("left", "right")
             for _, way in members.get(role, ())
-            for node in found.ways.get(way, ())[:: max(1, len(found.ways.get(way, ())) - 1)]
+            for node in lanelet_map.ways.get(way, ())[
+                :: max(1, len(lanelet_map.ways.get(way, ())) - 1)
+            ]
         }
     )
     if len(ends) < 2:
         return
-    pairs = cKDTree(found.line(ends)).query_pairs(_SAME_PLACE, output_type="ndarray")
+    pairs = cKDTree(lanelet_map.line(ends)).query_pairs(_SAME_PLACE, output_type="ndarray")
     same: dict[str, str] = {}
     for first, second in sorted(map(tuple, np.sort(pairs, axis=1).tolist())):
         same.setdefault(ends[second], same.get(ends[first], ends[first]))
     if not same:
         return
-    for way, refs in found.ways.items():
+    for way, refs in lanelet_map.ways.items():
         if not same.keys().isdisjoint(refs):
-            found.ways[way] = tuple(same.get(node, node) for node in refs)
+            lanelet_map.ways[way] = tuple(same.get(node, node) for node in refs)
     for node, kept in same.items():
-        found.entries.append(
+        lanelet_map.entries.append(
             ReportEntry(
                 ElementOutcome.REPAIRED,
                 f"node {shown_id(node)}",
@@ -415,54 +444,60 @@ def _weld_nodes(found: LaneletMap, relations: Sequence[Relation]) -> None:
 
 # ----------------------------------------------------------------------------- lanelets
 def _add_lanelet(
-    found: LaneletMap,
+    lanelet_map: LaneletMap,
     identity: str,
     tags: Tags,
     members: Mapping[str, list[tuple[str, str]]],
 ) -> None:
     """Read a lanelet with its bounds, or say why it cannot be read."""
-    if identity in found.lanelets:
-        found.lose("lanelet", identity, "its id is that of another one before it")
+    if identity in lanelet_map.lanelets:
+        lanelet_map.lose("lanelet", identity, "its id is that of another one before it")
         return
     bounds = []
     for role in ("left", "right"):
         ways = [way for kind, way in members.get(role, ()) if kind == "way"]
-        missing = [way for way in ways if way not in found.ways]
+        missing = [way for way in ways if way not in lanelet_map.ways]
         if missing or not ways:
             reason = f"line {missing[0]} is not in the file" if missing else "it has none"
-            found.lose("lanelet", identity, f"its {role} bound cannot be read: {reason}")
+            lanelet_map.lose("lanelet", identity, f"its {role} bound cannot be read: {reason}")
             return
-        bound = join_ways([(way, found.ways[way]) for way in ways])
+        bound = join_ways([(way, lanelet_map.ways[way]) for way in ways])
         if bound is None or len(set(bound.nodes)) < 2:
-            found.lose("lanelet", identity, f"the ways of its {role} bound do not make one line")
+            lanelet_map.lose(
+                "lanelet", identity, f"the ways of its {role} bound do not make one line"
+            )
             return
         bounds.append(bound)
-    left, right = _align_bounds(found, *bounds)
+    left, right = _align_bounds(lanelet_map, *bounds)
     subtype = tags.get("subtype", "")
     if subtype not in DRIVEN | WALKED | {"crosswalk"}:
-        said = subtype
-        subtype = _subtype_by_participants(tags)
+        tagged = subtype
+        subtype = _guess_subtype(tags)
         if not subtype:
-            found.lose("lanelet", identity, f"its subtype {shown(said)} is none of Lanelet2")
+            lanelet_map.lose(
+                "lanelet", identity, f"its subtype {shown(tagged)} is none of Lanelet2"
+            )
             return
-        if said or not any(key.startswith("participant") for key in tags):
-            reason = f"a lanelet of {'subtype ' + shown(said) if said else 'no subtype'}"
-            found.entries.append(
+        if tagged or not any(key.startswith("participant") for key in tags):
+            reason = f"a lanelet of {'subtype ' + shown(tagged) if tagged else 'no subtype'}"
+            lanelet_map.entries.append(
                 ReportEntry(
                     ElementOutcome.GUESSED,
                     f"lanelet {shown_id(identity)}",
                     f"{reason} is read as {subtype}",
-                    0.8 if not said else 0.5,
+                    0.8 if not tagged else 0.5,
                     identity,
                 )
             )
     regulations = tuple(
         ref for kind, ref in members.get("regulatory_element", ()) if kind == "relation"
     )
-    found.lanelets[identity] = Lanelet(identity, identity, subtype, left, right, tags, regulations)
+    lanelet_map.lanelets[identity] = Lanelet(
+        identity, identity, subtype, left, right, tags, regulations
+    )
 
 
-def _subtype_by_participants(tags: Tags) -> str:
+def _guess_subtype(tags: Tags) -> str:
     """Subtype of a lanelet that has none, by who may use it; empty if nobody is known to."""
     allowed = {
         key.partition(":")[2].split(":")[-1]
@@ -522,20 +557,20 @@ def reversed_bound(bound: Bound) -> Bound:
     return Bound(bound.nodes[::-1], tuple(reversed(ways)))
 
 
-def _align_bounds(found: LaneletMap, left: Bound, right: Bound) -> tuple[Bound, Bound]:
+def _align_bounds(lanelet_map: LaneletMap, left: Bound, right: Bound) -> tuple[Bound, Bound]:
     """Turn both bounds so that right is right of left, as ``lanelet::geometry::align`` does."""
     middles = [
         line[len(line) // 2] if len(line) > 2 else line.mean(axis=0)
-        for line in (found.line(left.nodes), found.line(right.nodes))
+        for line in (lanelet_map.line(left.nodes), lanelet_map.line(right.nodes))
     ]
-    if _side_of(found.line(left.nodes), middles[1]) > 0.0:
+    if _measure_side(lanelet_map.line(left.nodes), middles[1]) > 0.0:
         left = reversed_bound(left)
-    if _side_of(found.line(right.nodes), middles[0]) < 0.0:
+    if _measure_side(lanelet_map.line(right.nodes), middles[0]) < 0.0:
         right = reversed_bound(right)
     return left, right
 
 
-def _side_of(line: FloatArray, point: FloatArray) -> float:
+def _measure_side(line: FloatArray, point: FloatArray) -> float:
     """Signed distance of a point from a line in the plane, metres, positive to its left."""
     a, b = line[:-1, :2], line[1:, :2]
     along = b - a
@@ -552,15 +587,19 @@ def _side_of(line: FloatArray, point: FloatArray) -> float:
 
 
 def _add_area(
-    found: LaneletMap,
+    lanelet_map: LaneletMap,
     identity: str,
     tags: Tags,
     members: Mapping[str, list[tuple[str, str]]],
 ) -> None:
-    ways = [(way, found.ways[way]) for _, way in members.get("outer", ()) if way in found.ways]
+    ways = [
+        (way, lanelet_map.ways[way])
+        for _, way in members.get("outer", ())
+        if way in lanelet_map.ways
+    ]
     ring = join_ways(ways)
     if ring is None or len(set(ring.nodes)) < 3:
-        found.lose("area", identity, "the ways of its outer ring do not make one line")
+        lanelet_map.lose("area", identity, "the ways of its outer ring do not make one line")
         return
     nodes = ring.nodes[:-1] if ring.nodes[0] == ring.nodes[-1] else ring.nodes
-    found.areas.append(Area(identity, tags.get("subtype", ""), nodes))
+    lanelet_map.areas.append(Area(identity, tags.get("subtype", ""), nodes))

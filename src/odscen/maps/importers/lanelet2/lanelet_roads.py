@@ -307,7 +307,7 @@ def _link_ends(
     network: LaneNetwork, roads: Sequence[_StripRoad], place_of: dict[str, tuple[int, int]]
 ) -> dict[_End, _End]:
     """Which end of a road meets which of another one, without a junction between."""
-    found: dict[_End, _End] = {}
+    ends: dict[_End, _End] = {}
     for index, road in enumerate(roads):
         for column, lanelets in enumerate(road.columns):
             along = road.along[column]
@@ -319,9 +319,9 @@ def _link_ends(
                     continue
                 other, their = place_of[identity]
                 entry = _End(other, "start" if roads[other].along[their] else "end")
-                found.setdefault(end, entry)
-                found.setdefault(entry, end)
-    return found
+                ends.setdefault(end, entry)
+                ends.setdefault(entry, end)
+    return ends
 
 
 # ----------------------------------------------------------------------------- cuts
@@ -579,10 +579,10 @@ def _road_type(lanelets: Sequence[Lanelet]) -> str:
 
 def read_speed(text: str) -> float | None:
     """A speed of a tag in m/s, in km/h where it names no unit; ``None`` if it is none."""
-    found = _SPEED_PARTS.fullmatch(text.lower())
-    if found is None or float(found[1]) <= 0.0:
+    match = _SPEED_PARTS.fullmatch(text.lower())
+    if match is None or float(match[1]) <= 0.0:
         return None
-    return float(found[1]) * _PER_MPS.get(found[2] or "", 1.0 / 3.6)
+    return float(match[1]) * _PER_MPS.get(match[2] or "", 1.0 / 3.6)
 
 
 def speed_of(source: LaneletMap, lanelet: Lanelet) -> tuple[float | None, str]:

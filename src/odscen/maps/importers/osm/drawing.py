@@ -234,7 +234,7 @@ def _plan_roads(
         ]
         start = layout.cuts[Leg(street.number, False)]
         end = street.line.length - layout.cuts[Leg(street.number, True)]
-        crossed = [len(one.legs) > 2 for one in ends]
+        crossed = [len(end.legs) > 2 for end in ends]
         tags = network.ways[street.stretches[0].way].tags
         line = street.line.cut(start, end)
         sections = plan_sections(network, street, start, start + line.length, ends_at=crossed)
@@ -701,14 +701,16 @@ def _rank_priorities(
         if len(legs) < 3 or not low or len(high) < 2:
             return ()
         source = f"way {places.leg_way(network, low[0])}"
-        said = top > max(street.rank for street in CLASSES.values())
+        has_priority_road = top > max(street.rank for street in CLASSES.values())
         reason = (
             "gives way to the priority road: no sign says who does"
-            if said
+            if has_priority_road
             else "gives way to the more important street: no sign says who does"
         )
         element = f"junction {number} > road {plans[low[0].street].id}"
-        drawn.note(ElementOutcome.GUESSED, element, reason, 0.9 if said else 0.6, source)
+        drawn.note(
+            ElementOutcome.GUESSED, element, reason, 0.9 if has_priority_road else 0.6, source
+        )
     pairs = {
         (plans[a.street].id, plans[b.street].id) for a in high for b in low if a.street != b.street
     }
@@ -754,7 +756,7 @@ def _find_movements(
             usable = [e for e in exits if lanes_at[e]]
             if not coming or not usable:
                 continue
-            chosen, said = places.choose_exits(
+            chosen, by_turn_lanes = places.choose_exits(
                 [start.lanes[i] for i in coming],
                 [turns[e] for e in usable],
                 [len(lanes_at[e]) for e in usable],
@@ -762,7 +764,7 @@ def _find_movements(
             for place, exit_leg in enumerate(usable):
                 lanes = [coming[i] for i, exits_of in enumerate(chosen) if place in exits_of]
                 from_left = bool(lanes) and lanes[0] == coming[0]
-                if not lanes and said:
+                if not lanes and by_turn_lanes:
                     reason = "turn:lanes has no arrow for it: no connection"
                     element = f"road {plans[leg.street].id} to road {plans[exit_leg.street].id}"
                     source = f"way {places.leg_way(network, leg)}"
@@ -849,8 +851,8 @@ def _bicycle_movements(
             chosen = [max(exits, key=lambda e: turns[e])]
         for leg in chosen:
             lanes = outs[leg].lanes
-            bikes = [i for i, one in enumerate(lanes) if one.kind == "biking"]
-            general = [i for i, one in enumerate(lanes) if one.kind == "driving"]
+            bikes = [i for i, lane in enumerate(lanes) if lane.kind == "biking"]
+            general = [i for i, lane in enumerate(lanes) if lane.kind == "driving"]
             targets = bikes or general
             if targets:
                 result.append(Movement(start, lane, outs[leg], targets[-1], turns[leg], paths[leg]))

@@ -133,7 +133,7 @@ def find_crossings(
     extract: Extract, network: StreetNetwork
 ) -> tuple[list[StreetCrossing], list[ControlRow]]:
     """Crossings from nodes, and from footways that run across streets."""
-    found: list[StreetCrossing] = []
+    crossings: list[StreetCrossing] = []
     rows = []
     on_streets: dict[int, list[tuple[Street, int]]] = {}
     for street in network.streets:
@@ -161,10 +161,10 @@ def find_crossings(
         elif len(places) > 1 and item.id in network.ends and len(network.ends[item.id]) > 2:
             # In the middle of a junction: of the streets there the least one is not meant.
             street, place = max(places, key=lambda p: (p[0].line.length, -p[0].number))
-            found.append(_plan_crossing(street, place, source, tags, 0.5))
+            crossings.append(_plan_crossing(street, place, source, tags, 0.5))
         else:
             street, place = places[0]
-            found.append(_plan_crossing(street, place, source, tags, 0.9))
+            crossings.append(_plan_crossing(street, place, source, tags, 0.9))
     # Footways and paths across, where no node says so.
     lines = [street.line.trace for street in network.streets]
     tree = shapely.STRtree(lines)
@@ -194,14 +194,16 @@ def find_crossings(
                 if ends_here and not _goes_on(extract, way.id, refs, network, point):
                     continue
                 s = street.line.project(point.x, point.y)
-                if any(c.street == street.number and abs(c.s - s) < SAME_CROSSING for c in found):
+                if any(
+                    c.street == street.number and abs(c.s - s) < SAME_CROSSING for c in crossings
+                ):
                     continue
                 if shared or tags.get("footway") == "crossing" or tags.get("path") == "crossing":
                     confidence = 0.7
                 else:
                     confidence = 0.5
                 light = tags.get("crossing") == "traffic_signals"
-                found.append(
+                crossings.append(
                     StreetCrossing(
                         street.number,
                         s,
@@ -212,7 +214,7 @@ def find_crossings(
                         confidence,
                     )
                 )
-    return found, rows
+    return crossings, rows
 
 
 def _is_elsewhere(network: StreetNetwork, street: Street) -> bool:
@@ -356,12 +358,12 @@ def find_controls(
 
 def _legs_faced_by(network: StreetNetwork, legs: list[Leg], tags: Tags) -> list[Leg]:
     """The legs that a light between two streets is for."""
-    said = tags.get("traffic_signals:direction", "")
+    direction = tags.get("traffic_signals:direction", "")
     chosen = []
     for leg in legs:
         stretch = network.streets[leg.street].stretches[-1 if leg.at_end else 0]
         along_way = stretch.ahead == leg.at_end
-        if said not in ("forward", "backward") or along_way == (said == "forward"):
+        if direction not in ("forward", "backward") or along_way == (direction == "forward"):
             chosen.append(leg)
     return chosen or legs
 
@@ -378,16 +380,18 @@ def _directions_faced_by(
     network: StreetNetwork, street: Street, place: int, tags: Tags
 ) -> list[bool]:
     """For traffic along the street, against it, or both."""
-    stretch = next(one for one in street.stretches if one.first <= place <= one.last)
+    stretch = next(
+        stretch for stretch in street.stretches if stretch.first <= place <= stretch.last
+    )
     section = network.section(stretch)
-    said = tags.get("traffic_signals:direction") or tags.get("direction", "")
+    direction = tags.get("traffic_signals:direction") or tags.get("direction", "")
     possible = [
         ahead
         for ahead, lanes in ((True, section.right), (False, section.left))
         if any(lane.carries_cars for lane in lanes)
     ]
-    if said in ("forward", "backward"):
-        ahead = (said == "forward") == stretch.ahead
+    if direction in ("forward", "backward"):
+        ahead = (direction == "forward") == stretch.ahead
         return [ahead] if ahead in possible else possible
     return possible
 

@@ -495,8 +495,7 @@ def choose_exits(
     if not exits:
         return [set() for _ in lanes], False
     tokens = [lane.turns for lane in lanes]
-    said = set().union(*tokens) - {"none", "merge_to_left", "merge_to_right"} if tokens else set()
-    if said:
+    if set().union(*tokens) - {"none", "merge_to_left", "merge_to_right"}:
         values = sorted(set().union(*tokens), key=lambda token: -_IDEAL.get(token, 0.0))
         chosen: dict[str, set[int]] = {value: set() for value in values}
         for place in exits:

@@ -79,7 +79,7 @@ class RoadPlan:
 
     def section_at(self, s: float) -> PlannedSection:
         """The section at ``s``."""
-        return next((one for one in self.sections if s < one.s_end), self.sections[-1])
+        return next((section for section in self.sections if s < section.s_end), self.sections[-1])
 
     def lanes(self, *, at_end: bool, arriving: bool) -> list[StreetLane]:
         """Lanes that arrive at an end, or leave it, from the divider outwards."""
@@ -376,7 +376,11 @@ def make_road(plan: RoadPlan, *, kind: str, elevation: tuple[model.Cubic, ...] =
         )
         for section in sections
     )
-    types = tuple(one for i, one in enumerate(types) if i == 0 or one.speed != types[i - 1].speed)
+    types = tuple(
+        road_type
+        for i, road_type in enumerate(types)
+        if i == 0 or road_type.speed != types[i - 1].speed
+    )
     kept_offsets = [c for c in offsets if any(c[1:])] and offsets
     return model.Road(
         id=model_id(plan.id),

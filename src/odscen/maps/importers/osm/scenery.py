@@ -89,11 +89,11 @@ def draw_scenery(
             rows.append(SceneryRow(False, source, reason, 0.8, source))
             counts["through"] += 1
             continue
-        height, said = _building_height(tags)
+        height, height_source = _building_height(tags)
         outline = np.asarray(ring.exterior.coords)[:-1]
         if _add_object(roads, tree, outline, "building", tags, height, new_object):
             counts["building"] += 1
-            counts["guessed"] += not said
+            counts["guessed"] += not height_source
     for node in sorted(extract.nodes.values()):
         if node.tags.get("natural") != "tree" or node.id not in network.places:
             continue
@@ -202,8 +202,8 @@ def _building_height(tags: Tags) -> tuple[float, bool]:
 
 def _read_metres(text: str) -> float:
     """A positive number with or without ``m``; 0 if it is none."""
-    found = re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*m?", text.strip())
-    return min(float(found[1].replace(",", ".")), 900.0) if found else 0.0
+    match = re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*m?", text.strip())
+    return min(float(match[1].replace(",", ".")), 900.0) if match else 0.0
 
 
 def _add_object(
@@ -377,13 +377,13 @@ def _find_overpasses(
             # Of two bridges, or two tunnels, the outer one is a storey further from the ground.
             storeys = 2 if levels[0] * levels[1] > 0 else 1
             if levels[high] > 0:
-                moved, z, said = high, CLEARANCE * storeys, "bridge"
+                moved, z, kind = high, CLEARANCE * storeys, "bridge"
             else:
-                moved, z, said = 1 - high, -CLEARANCE * storeys, "tunnel"
+                moved, z, kind = 1 - high, -CLEARANCE * storeys, "tunnel"
             sources.append((streets[moved].number, places[moved], z))
             source = f"way {ways[moved]}"
             reason = (
-                f"{said}: {abs(z):g} m {'above' if z > 0 else 'below'} the ground, as it crosses "
+                f"{kind}: {abs(z):g} m {'above' if z > 0 else 'below'} the ground, as it crosses "
                 f"OSM way {ways[1 - moved]}"
             )
             rows.append(SceneryRow(True, source, reason, 0.4, source))

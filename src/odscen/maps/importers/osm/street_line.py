@@ -260,7 +260,7 @@ def curves_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> list[Cubic]
     """
     turn = math.remainder(end.hdg - start.hdg, 2.0 * math.pi)
     if bulge == 0.0 and _TURNS[0] < abs(turn) < _TURNS[1]:
-        ahead, meet = _find_tangents(*_in_frame_of(start, end), turn)
+        ahead, meet = _find_tangents(*_offset_in_frame(start, end), turn)
         short = min(meet, ahead)
         if short > _SHORTEST_TANGENT and max(meet, ahead) - short > _UNEVEN:
             begins, ends = start.ahead(max(0.0, ahead - short)), end.ahead(-max(0.0, meet - short))
@@ -299,7 +299,7 @@ def least_radius(parts: Sequence[Cubic]) -> float:
     return 1.0 / max(*bends, 1e-9)
 
 
-def _in_frame_of(start: Pose, end: Pose) -> tuple[float, float]:
+def _offset_in_frame(start: Pose, end: Pose) -> tuple[float, float]:
     """Metres ahead and to the left of a pose at which another one is."""
     dx, dy = end.x - start.x, end.y - start.y
     cos, sin = math.cos(start.hdg), math.sin(start.hdg)
@@ -323,7 +323,7 @@ def curve_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> Cubic:
     ``4/3 tan(turn / 4)`` radii; ``bulge`` makes them at least so long, metres, which widens a turn
     back.
     """
-    u, v = _in_frame_of(start, end)
+    u, v = _offset_in_frame(start, end)
     turn = math.remainder(end.hdg - start.hdg, 2.0 * math.pi)
     chord, half = math.hypot(u, v), abs(turn) / 2.0
     handle = chord / 3.0
@@ -343,7 +343,7 @@ def curve_between(start: Pose, end: Pose, *, bulge: float = 0.0) -> Cubic:
 
 def _draw_bezier(start: Pose, end: Pose, first: float, second: float) -> Cubic:
     """The cubic Bezier curve from pose to pose with handles of these lengths, metres."""
-    u, v = _in_frame_of(start, end)
+    u, v = _offset_in_frame(start, end)
     turn = end.hdg - start.hdg
     out = (u - second * math.cos(turn), v - second * math.sin(turn))
     p0, p1, p2, p3 = np.array([(0.0, 0.0), (first, 0.0), out, (u, v)])

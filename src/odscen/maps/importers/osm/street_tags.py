@@ -310,15 +310,15 @@ def read_speed(value: str, country: Country) -> float | None:
         return NO_LIMIT
     if text == "walk":
         return 7.0 * KMH
-    if found := re.fullmatch(r"(\d+(?:\.\d+)?)\s*(km/h|kmh|kph|mph|knots)?", text):
-        unit = {"mph": MPH, "knots": KNOT}.get(found[2] or "", KMH)
-        speed = float(found[1]) * unit
+    if match := re.fullmatch(r"(\d+(?:\.\d+)?)\s*(km/h|kmh|kph|mph|knots)?", text):
+        unit = {"mph": MPH, "knots": KNOT}.get(match[2] or "", KMH)
+        speed = float(match[1]) * unit
         return speed if 0.5 < speed < 100.0 else None
-    if found := re.fullmatch(r"([a-z]{2})(?:-[a-z]+)?:(?:zone:?)?([a-z_]*)(\d*)", text):
-        limits = _LIMITS.get(found[1].upper(), country.limits)
-        if found[3]:
-            return float(found[3]) * (MPH if found[1] in ("gb", "uk", "us") else KMH)
-        name = found[2].strip(":_")
+    if match := re.fullmatch(r"([a-z]{2})(?:-[a-z]+)?:(?:zone:?)?([a-z_]*)(\d*)", text):
+        limits = _LIMITS.get(match[1].upper(), country.limits)
+        if match[3]:
+            return float(match[3]) * (MPH if match[1] in ("gb", "uk", "us") else KMH)
+        name = match[2].strip(":_")
         if name in _FIXED_ZONES and name not in limits:
             return _FIXED_ZONES[name] * KMH
         if name in limits:
@@ -360,9 +360,9 @@ def is_oneway(tags: Tags) -> int:
 
 def read_width(value: str) -> float | None:
     """A width in metres; ``None`` if it is none that is understood."""
-    if found := re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*(m|ft|')?", value.lower().strip()):
-        number = float(found[1].replace(",", "."))
-        return number * 0.3048 if found[2] in ("ft", "'") else number
+    if match := re.fullmatch(r"(\d+(?:[.,]\d+)?)\s*(m|ft|')?", value.lower().strip()):
+        number = float(match[1].replace(",", "."))
+        return number * 0.3048 if match[2] in ("ft", "'") else number
     return None
 
 
@@ -502,10 +502,10 @@ def _read_direction(
         if turns:
             index = place if len(turns) == total else sum(k != "biking" for k in kinds[:place])
             if len(turns) == total or kind != "biking":
-                said = turns[index] if index < len(turns) else ""
-                tokens = frozenset(part.strip() for part in said.split(";")) - {""} or frozenset(
-                    ["none"]
-                )
+                turn_text = turns[index] if index < len(turns) else ""
+                tokens = frozenset(part.strip() for part in turn_text.split(";")) - {
+                    ""
+                } or frozenset(["none"])
         wide = read_width(value("width", place))
         own = BIKE_WIDTH if kind == "biking" else width
         if wide is not None and not 1.0 <= wide <= 7.5:
@@ -671,19 +671,19 @@ def read_street(tags: Tags, country: Country, *, walks: Mapping[str, bool]) -> S
         parked = _parking_width(keys, side)
         if parked is not None:
             lanes.append(StreetLane("parking", parked, change="no"))
-        said = _has_sidewalk(keys, side)
+        sidewalk = _has_sidewalk(keys, side)
         width_text = keys.get(f"sidewalk:{side}:width", "sidewalk:both:width")
         walk = (read_width(width_text) if width_text else None) or WALK_WIDTH
         walk = min(max(walk, 1.0), 6.0)
-        if said == "yes" or (said in ("", "separate") and walks.get(side, False)):
+        if sidewalk == "yes" or (sidewalk in ("", "separate") and walks.get(side, False)):
             lanes.append(StreetLane("sidewalk", walk, change="no"))
-            if said != "yes":
+            if sidewalk != "yes":
                 guesses.append(
                     Guess(f"sidewalk on the {side}: a footway runs beside the road", 0.7)
                 )
             elif not width_text:
                 guesses.append(Guess(f"sidewalk of {walk:g} m", 0.6))
-        elif said == "separate":
+        elif sidewalk == "separate":
             key = next(k for k in (f"sidewalk:{side}", "sidewalk:both", "sidewalk") if k in tags)
             keys.ignored[key] = "no footway of the extract runs beside the road"
 
@@ -708,20 +708,20 @@ def _divider_offset(section: CrossSection, keys: _Keys, oneway: bool) -> float:
         ("placement:backward", left, -1.0),
     ):
         value = keys.tags.get(key, "")
-        found = re.fullmatch(r"(left_of|right_of|middle_of):(-?\d+)", value)
-        if not found or (key == "placement" and not oneway):
+        match = re.fullmatch(r"(left_of|right_of|middle_of):(-?\d+)", value)
+        if not match or (key == "placement" and not oneway):
             if value:
                 keys.ignored[key] = f"{value!r} is not understood, or has no direction"
             continue
         # The number counts lanes for cars, but where lists of lanes have bicycle lanes, those too.
-        number = int(found[2])
+        number = int(match[2])
         number += len(lanes) + 1 if number < 0 else 0
         if not 1 <= number <= len(lanes):
             keys.ignored[key] = f"there is no lane {number}"
             continue
         keys.used[key] = value
         before = sum(lane.width for lane in lanes[: number - 1])
-        share = {"left_of": 0.0, "middle_of": 0.5, "right_of": 1.0}[found[1]]
+        share = {"left_of": 0.0, "middle_of": 0.5, "right_of": 1.0}[match[1]]
         return sign * (before + share * lanes[number - 1].width)
     return (wide_right - wide_left) / 2
 
