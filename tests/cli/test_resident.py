@@ -159,9 +159,18 @@ def test_a_package_that_has_come_is_seen(environment, tmp_path, workspace):
     assert not was_handed_over(variables, "maps", "list", "--workspace", workspace)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_a_signal_ends_what_was_handed_over(ready, tmp_path, workspace, number):
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored here
+@pytest.mark.parametrize(
+    ("number", "at_start"),
+    [
+        (signal.SIGINT, signal.default_int_handler),
+        (signal.SIGTERM, signal.SIG_DFL),
+        (signal.SIGTERM, signal.SIG_IGN),  # as services may start it; heeded as by any command
+        (signal.SIGKILL, signal.SIG_DFL),
+    ],
+)
+def test_a_signal_ends_what_was_handed_over(ready, tmp_path, workspace, number, at_start):
+    heeded = signal.SIGINT if number == signal.SIGKILL else number
+    before = signal.signal(heeded, at_start)  # it may be ignored here, and is inherited
     w = ("--workspace", workspace)
     odscen("generate", "--map", "signal_crossing", "--fill", "0.3", "--out", tmp_path / "s", *w)
     runs = tmp_path / "r"
@@ -173,7 +182,7 @@ def test_a_signal_ends_what_was_handed_over(ready, tmp_path, workspace, number):
             time.sleep(0.01)
         process.send_signal(number)
         _, err = process.communicate(timeout=PATIENCE)
-    signal.signal(signal.SIGINT, before)
+    signal.signal(heeded, before)
     assert process.returncode == (-signal.SIGKILL if number == signal.SIGKILL else 130)
     assert "Traceback" not in err
     wait_until(lambda: not list(runs.glob("*")))

@@ -102,7 +102,12 @@ def _connect_to_staying(surroundings: bytes) -> socket.socket:
 
 def _hand_over(connection: socket.socket, surroundings: bytes) -> int | None:
     """Hand the command over; its exit code, or ``None`` if it was not taken."""
-    ignored = [int(one) for one in PASSED_ON if signal.getsignal(one) is signal.SIG_IGN]
+    # A command heeds SIGTERM also where it was started with that ignored, as by some services.
+    ignored = [
+        int(one)
+        for one in PASSED_ON
+        if one != signal.SIGTERM and signal.getsignal(one) is signal.SIG_IGN
+    ]
     request = {
         "surroundings": surroundings.decode("utf-8", "surrogateescape"),
         "argv": sys.argv,
