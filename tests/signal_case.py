@@ -83,7 +83,7 @@ def timing(**fields: Any) -> JunctionTiming:
 def scenario(
     junction: dict[str, Any] | None,
     *,
-    control: str = "fixed",
+    control: str | None = "fixed",
     clock: float = 0.0,
     walkers: float = 60.0,
     vehicles: float = 300.0,

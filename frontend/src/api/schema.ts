@@ -4410,7 +4410,6 @@ export interface components {
             transit: components["schemas"]["Transit"];
             /**
              * @default {
-             *       "control": "fixed",
              *       "bus_priority": false,
              *       "junctions": []
              *     }
@@ -4988,8 +4987,7 @@ export interface components {
              * @enum {string}
              */
             kind: "set_signal_control";
-            /** @enum {string} */
-            control: "fixed" | "extended" | "actuated";
+            control: ("fixed" | "extended" | "actuated") | null;
         };
         /** @description Change fields of :class:`~odscen.scenario.document.scenario_document.Simulation`. */
         SetSimulationEdit: {
@@ -5300,16 +5298,15 @@ export interface components {
          *
          *     Extended lights of the map keep its greens, and prolong each while vehicles follow each other,
          *     up to a cycle of two minutes. Actuated ones let arriving vehicles call stages and end greens.
+         *     Where nothing is said (``None``) lights of the map are extended, as no demand is known when a
+         *     map is converted; those of a network from outside run as that network has it, and lights whose
+         *     greens, offset or program the scenario gives run by these.
          *
          *     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
          *     that waits elsewhere.
          */
         Signals: {
-            /**
-             * @default fixed
-             * @enum {string}
-             */
-            control: "fixed" | "extended" | "actuated";
+            control: ("fixed" | "extended" | "actuated") | null;
             /** @default false */
             bus_priority: boolean;
             /** @default [] */

@@ -7,12 +7,16 @@ import { localized } from "../language/localized";
 import type { PlaceNames } from "../map/placeNames";
 import { byNameOrId, junctionChoices } from "../ui/choices";
 
+/** Nothing is said in the scenario. */
+const UNSAID = "unsaid";
 const CONTROLS = localized(() => [
+  { value: UNSAID, label: t`Default` },
   { value: "fixed", label: t`Fixed-time` },
   { value: "extended", label: t`Extended` },
   { value: "actuated", label: t`Actuated` },
 ]);
 const CONTROL_NOTES = localized(() => ({
+  [UNSAID]: t`Greens of the map last longer while vehicles follow each other. Lights timed here, or by another network, keep their times.`,
   fixed: t`Every signal keeps its times.`,
   extended: t`A green lasts as long as planned, and longer while vehicles follow each other.`,
   actuated: t`A green is extended while vehicles arrive.`,
@@ -89,18 +93,19 @@ export function LightsStep({
         </Text>
         <SegmentedControl
           fullWidth
+          orientation="vertical"
           data={CONTROLS()}
-          value={control}
+          value={control ?? UNSAID}
           aria-label={t`Signal control`}
           onChange={(value) =>
             onEdit({
               kind: "set_signal_control",
-              control: value === "actuated" || value === "extended" ? value : "fixed",
+              control: value === "fixed" || value === "actuated" || value === "extended" ? value : null,
             })
           }
         />
         <Text size="xs" c="dimmed" mt={4}>
-          {CONTROL_NOTES()[control]}
+          {CONTROL_NOTES()[control ?? UNSAID]}
         </Text>
       </div>
     </>

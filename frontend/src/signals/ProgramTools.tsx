@@ -49,7 +49,12 @@ const SAME = "same";
 export function ProgramControl({ light, junction, places, editing }: Editable & { places: PlaceNames }) {
   const { timing, control, edit } = editing;
   const own = light.origin === "scenario";
-  const all = { fixed: t`fixed-time`, extended: t`extended`, actuated: t`actuated` }[control];
+  const all = {
+    fixed: t`fixed-time`,
+    extended: t`extended`,
+    actuated: t`actuated`,
+    unsaid: t`default`,
+  }[control ?? "unsaid"];
   return (
     <>
       <Select

@@ -22,6 +22,8 @@ def draw_moment(seed: int) -> float:
 def signals_at(loaded: LoadedMap, moment: float) -> Signals:
     """Programs of the map, moved so that a run begins as they are at a moment.
 
+    Extended greens count with their shortest times, as it is not known who came.
+
     Parameters
     ----------
     moment
@@ -36,5 +38,12 @@ def signals_at(loaded: LoadedMap, moment: float) -> Signals:
         if abs((offset - light.offset) % cycle) > 1e-6:
             name = light.junctions[0] if light.junctions else light.id
             # An offset of 0 is that of the map.
-            timings.append(JunctionTiming(junction=str(name), offset=offset or cycle))
+            timings.append(
+                JunctionTiming(
+                    junction=str(name),
+                    offset=offset or cycle,
+                    # Of itself a light with an offset of the scenario's is fixed-time.
+                    control=loaded.sumo.control,
+                )
+            )
     return Signals(junctions=tuple(timings))

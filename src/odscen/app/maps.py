@@ -56,7 +56,7 @@ def load_map(entry: MapEntry) -> LoadedMap:
         spaces=drawing.parking_spaces.each,
         strips=[ring for rings in strips for ring in rings.each],
     )
-    sumo = SumoMap.of(graph, entry.lane_table(), parking=parking)
+    sumo = SumoMap.of(graph, entry.lane_table(), parking=parking, converter=entry.converter)
     lights = scenario_lights(sumo)
     return LoadedMap(entry, sumo, usable_places(sumo), drawing, lights)
 

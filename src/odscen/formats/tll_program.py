@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from odscen.base.errors import InputError
+from odscen.convert.model.extended_greens import CONTROL_PARAM, MAP_STAGES, STAGES_PARAM
 from odscen.formats.tll_loops import taken_detectors
 from odscen.formats.tll_stages import (
     GAP,
@@ -32,12 +33,7 @@ from odscen.scenario.signals.program_design import (
     change_steps,
     stage_state,
 )
-from odscen.sumo.realize.lights.light_realization import (
-    CONTROL_PARAM,
-    GROUP_PARAM,
-    MAP_STAGES,
-    STAGES_PARAM,
-)
+from odscen.sumo.realize.lights.light_realization import GROUP_PARAM
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

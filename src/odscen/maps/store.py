@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from odscen.maps.importers.base import ImportSettings
     from odscen.simulators.assets import Assets
 
-BUILDER = "19"
+BUILDER = "20"
 """Raised whenever what a map folder contains changes; older folders are rebuilt when opened."""
 
 ENVIRONMENT_VARIABLE = "ODSCEN_WORKSPACE"

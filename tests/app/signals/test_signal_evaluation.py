@@ -44,7 +44,7 @@ def with_closure(one: Scenario, *, begin: float) -> Scenario:
 def test_a_program_that_starves_a_street_is_found_to_be_worse_and_its_reverse_better(
     workspace: Workspace,
 ) -> None:
-    today = placed(workspace, scenario(None, vehicles=500.0, walkers=0.0))
+    today = placed(workspace, scenario(None, control=None, vehicles=500.0, walkers=0.0))
     (light,) = time_signals(workspace, today).lights
     greens = (60.0, *(5.0 for _ in light.before.green[1:]))
     starved = with_timings(today, [JunctionTiming(junction=JUNCTION, green=greens)])

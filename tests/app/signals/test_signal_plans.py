@@ -153,7 +153,7 @@ def test_an_actuated_light_with_the_stages_of_the_map_comes_back_as_it_was(
     assert export_signals(workspace, back) == export_signals(workspace, one)
 
 
-@pytest.mark.parametrize("own", [{}, {"green": [18, 13], "offset": 7}])
+@pytest.mark.parametrize("own", [{"offset": 7}, {"green": [18, 13], "offset": 7}])
 def test_an_extended_light_comes_back_as_it_was(
     workspace: Workspace, tmp_path: Path, own: dict[str, object]
 ) -> None:
@@ -163,10 +163,24 @@ def test_an_extended_light_comes_back_as_it_was(
     assert export_signals(workspace, back) == export_signals(workspace, one)
 
 
-def test_the_program_of_the_network_becomes_one_of_stages(workspace: Workspace) -> None:
-    """Where vehicles begin before the crossings, they have a short stage of their own."""
+def test_the_program_of_the_network_is_that_of_the_map(workspace: Workspace) -> None:
     one = placed(workspace, scenario(None))
     net = workspace.map("signal_crossing").path("net")
+    back, notes = import_signals(workspace, one, net, junctions=["10001"])
+    assert notes == ()
+    (timing,) = back.signals.junctions
+    assert (timing.control, timing.green, timing.stages) == ("extended", (), ())
+
+
+def test_a_fixed_program_of_a_network_becomes_one_of_stages(
+    workspace: Workspace, tmp_path: Path
+) -> None:
+    """Where vehicles begin before the crossings, they have a short stage of their own."""
+    one = placed(workspace, scenario(None))
+    lines = workspace.map("signal_crossing").path("net").read_text().splitlines()
+    net = tmp_path / "fixed.net.xml"
+    fixed = [line.replace('"actuated"', '"static"') for line in lines if '"odscen.' not in line]
+    net.write_text("\n".join(fixed))
     back, notes = import_signals(workspace, one, net, junctions=["10001"])
     assert notes
     assert all("shows G for g: it has nothing to yield to" in note for note in notes)
@@ -339,8 +353,9 @@ def test_a_junction_without_a_light_is_answered_with_those_that_have_one(
 def test_there_is_nothing_to_export_where_all_lights_are_as_in_the_map(
     workspace: Workspace,
 ) -> None:
-    with pytest.raises(InputError, match="changes no traffic light"):
-        export_signals(workspace, placed(workspace, scenario(None)))
+    for control in (None, "extended"):
+        with pytest.raises(InputError, match="changes no traffic light"):
+            export_signals(workspace, placed(workspace, scenario(None, control=control)))
 
 
 def test_a_scenario_with_a_program_is_read_as_it_was_written(

@@ -132,7 +132,7 @@ def test_the_last_letter_of_a_response_is_the_first_link() -> None:
 
 
 def test_a_light_has_its_phases_and_names_the_signals_behind_its_links() -> None:
-    phases = (Phase(31.0, "Gr", "stage 1", 8.0, 62.0), Phase(3.0, "yr"))
+    phases = (Phase(31.0, "Gr", "stage 1"), Phase(3.0, "yr"))
     light = TrafficLight("j", phases, signals=(("s1", "s2"), ()))
     found = text(net(lights=(light,))).find("tlLogic")
     assert [p.attrib for p in found.iter("phase")] == [
@@ -144,11 +144,21 @@ def test_a_light_has_its_phases_and_names_the_signals_behind_its_links() -> None
     ]
 
 
-def test_only_actuated_phases_have_bounds() -> None:
-    light = TrafficLight("j", (Phase(31.0, "G", "", 8.0, 62.0), Phase(3.0, "y")), "actuated")
-    first, second = text(net(lights=(light,))).findall("tlLogic/phase")
-    assert (first.get("minDur"), first.get("maxDur")) == ("8", "62")
-    assert second.get("minDur") is None
+def test_greens_that_vehicles_may_prolong_share_what_is_left_of_two_minutes() -> None:
+    greens = Phase(31.0, "Gr", "", 8.0, 62.0), Phase(20.0, "rG", "", 8.0, 40.0)
+    logic = text(net(lights=(TrafficLight("j", (*greens, Phase(9.0, "rr"))),))).find("tlLogic")
+    assert logic.get("type") == "actuated"
+    bounds = [(p.get("duration"), p.get("minDur"), p.get("maxDur")) for p in logic.iter("phase")]
+    assert bounds == [("31", "31", "61"), ("20", "20", "50"), ("9", None, None)]
+    params = {p.get("key"): p.get("value") for p in logic.iter("param")}
+    assert params["max-gap"] == "2"
+
+
+def test_a_light_whose_cycle_is_two_minutes_already_is_not_prolonged() -> None:
+    phases = (Phase(117.0, "G", "", 8.0, 234.0), Phase(3.0, "y"))
+    logic = text(net(lights=(TrafficLight("j", phases),))).find("tlLogic")
+    assert logic.get("type") == "static"
+    assert [p.get("minDur") for p in logic.iter("phase")] == [None, None]
 
 
 def test_counts_are_those_outside_junctions() -> None:

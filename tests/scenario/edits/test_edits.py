@@ -242,4 +242,4 @@ def test_timing_that_can_never_be_right_is_refused(
 def test_all_lights_are_actuated_at_once() -> None:
     new = edits.set_signal_control(scenario(), control="actuated")
     assert new.signals.control == "actuated"
-    assert edits.set_signal_control(new, control="fixed") == scenario()
+    assert edits.set_signal_control(new, control=None) == scenario()

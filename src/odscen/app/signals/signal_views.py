@@ -11,6 +11,7 @@ from odscen.app.signals.signal_plans import signal_programs
 from odscen.base.errors import InputError, NotFoundError
 from odscen.scenario.signals.program_design import DesignedProgram
 from odscen.sumo.realize.lights.actuated.detector_places import lane_lines
+from odscen.sumo.realize.sumo_map import NETWORK_CONTROLS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -44,7 +45,7 @@ def program_origin(
     )
     priority = signals.bus_priority if timing is None else bool(timing.bus_priority)
     changed = timing is not None and (bool(timing.green) or timing.offset != 0.0)
-    if changed or priority or light.control != "fixed":
+    if changed or priority or light.control not in ("fixed", NETWORK_CONTROLS[converter]):
         return "retimed"
     return converter
 

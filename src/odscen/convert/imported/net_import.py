@@ -16,6 +16,7 @@ from lxml import etree
 from odscen.base.errors import InputError
 from odscen.base.ids import SumoEdgeId, SumoLaneId
 from odscen.base.xml_reading import read_xml
+from odscen.convert.model.extended_greens import CONTROL_PARAM
 from odscen.convert.model.net import CROSSING, NORMAL, STAGE, WALKING_AREA, Phase, Request
 
 if TYPE_CHECKING:
@@ -332,6 +333,8 @@ def _import_light(light: Any) -> ImportedLight:
         stages = stage_numbers([phase.state for phase in phases])
         names = [f"{STAGE}{stage}" if stage else "" for stage in stages]
     count = max((len(phase.state) for phase in phases), default=0)
+    # Ours came back: its bounds are those of extended greens, and calls begin earlier.
+    extended = params.get(CONTROL_PARAM) == "extended"
     return ImportedLight(
         str(light.getID()),
         tuple(
@@ -339,7 +342,13 @@ def _import_light(light: Any) -> ImportedLight:
                 float(phase.duration),
                 phase.state,
                 name,
-                *_phase_bounds(float(phase.minDur), float(phase.maxDur), float(phase.duration)),
+                *(
+                    (0.0, 0.0)
+                    if extended
+                    else _phase_bounds(
+                        float(phase.minDur), float(phase.maxDur), float(phase.duration)
+                    )
+                ),
             )
             for phase, name in zip(phases, names, strict=True)
         ),

@@ -226,7 +226,6 @@ class TrafficLight:
 
     id: str
     phases: tuple[Phase, ...]
-    type: str = "static"
     offset: float = 0.0
     program: str = "0"
     signals: tuple[tuple[str, ...], ...] = ()

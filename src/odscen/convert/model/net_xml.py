@@ -9,6 +9,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from odscen.convert.model.curve_speed import HEAVY_CLASSES
+from odscen.convert.model.extended_greens import EXTENDED_PARAMS, longer_by
 from odscen.convert.model.net import DIGITS, INTERNAL, NORMAL
 from odscen.convert.model.net_shapes import border
 
@@ -158,20 +159,25 @@ class _NetworkWriter:
 
 def _light_lines(light: TrafficLight) -> Iterator[str]:
     """Lines of one ``<tlLogic>``."""
+    more = longer_by(light.phases, sum(phase.duration for phase in light.phases))
+    kind = "actuated" if more else "static"
     yield (
-        f'    <tlLogic id="{light.id}" type="{light.type}" programID="{light.program}"'
+        f'    <tlLogic id="{light.id}" type="{kind}" programID="{light.program}"'
         f' offset="{light.offset:g}">'
     )
     for phase in light.phases:
         bounds = ""
-        if light.type == "actuated" and phase.most > phase.least:
-            bounds = f' minDur="{phase.least:g}" maxDur="{phase.most:g}"'
+        if more and phase.most > phase.least:
+            longest = phase.duration + more
+            bounds = f' minDur="{phase.duration:g}" maxDur="{longest:g}"'
         name = f' name="{_quote_attribute(phase.name)}"' if phase.name else ""
         yield f'        <phase duration="{phase.duration:g}" state="{phase.state}"{bounds}{name}/>'
     for index, signals in enumerate(light.signals):
         if signals:
             value = _quote_attribute(" ".join(signals))
             yield f'        <param key="linkSignalID:{index}" value="{value}"/>'
+    for key, value in (EXTENDED_PARAMS if more else {}).items():
+        yield f'        <param key="{key}" value="{value}"/>'
     yield "    </tlLogic>"
 
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+from odscen.convert.model.extended_greens import LONGEST_CYCLE
 from odscen.convert.model.net import STAGE, Phase
 
 if TYPE_CHECKING:
@@ -32,8 +33,7 @@ Moderate traffic: a cycle for saturated roads would let everybody wait long on a
 """
 
 SHORTEST_CYCLE = 40.0
-LONGEST_CYCLE = 120.0
-"""Seconds; HCM advises against longer ones."""
+"""Seconds."""
 
 LEAST_GREEN = 8.0
 WALK_GREEN = 7.0

@@ -332,7 +332,7 @@ def signal_problems(
             yield error("light_twice", f"{where}.junction", message)
         timed.setdefault(light.names, where)
         yield from _green_problems(timing, light, where)
-        control = signals.control_of(timing)
+        control = signals.control_of(timing) or "fixed"
         if timing.stages and timing.control == "extended":
             message = (
                 f"the light of junction {timing.junction!r} has a program of its own; extended "

@@ -141,16 +141,25 @@ class Signals(Part):
 
     Extended lights of the map keep its greens, and prolong each while vehicles follow each other,
     up to a cycle of two minutes. Actuated ones let arriving vehicles call stages and end greens.
+    Where nothing is said (``None``) lights of the map are extended, as no demand is known when a
+    map is converted; those of a network from outside run as that network has it, and lights whose
+    greens, offset or program the scenario gives run by these.
 
     With ``bus_priority`` a green lasts longer for a bus that comes to it, and ends early for one
     that waits elsewhere.
     """
 
-    control: Control = "fixed"
+    control: Control | None = None
     bus_priority: bool = False
     junctions: tuple[JunctionTiming, ...] = ()
 
-    def control_of(self, timing: JunctionTiming) -> Control:
-        """How a light is run: what its program has of its own is not extended."""
+    def control_of(self, timing: JunctionTiming) -> Control | None:
+        """How a light is run; ``None`` if nothing is said.
+
+        What its program has of its own is not extended.
+        """
         control = timing.control or self.control
-        return "fixed" if timing.stages and control == "extended" else control
+        if timing.stages and control in (None, "extended"):
+            return "fixed"
+        timed = bool(timing.green or timing.offset)
+        return "fixed" if control is None and timed else control

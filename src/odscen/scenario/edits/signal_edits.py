@@ -25,9 +25,12 @@ if TYPE_CHECKING:
     from odscen.scenario.signals.light import Light
 
 
-@edit("Traffic lights {control}")
-def set_signal_control(scenario: Scenario, *, control: Control) -> Scenario:
-    """Say how all traffic lights are run that have no control of their own."""
+@edit("Control of traffic lights")
+def set_signal_control(scenario: Scenario, *, control: Control | None) -> Scenario:
+    """Say how all traffic lights are run that have no control of their own.
+
+    ``None`` leaves them as the map has them, and those that the scenario times to their times.
+    """
     return with_fields(scenario, signals=changed_part(scenario.signals, {"control": control}))
 
 

@@ -19,11 +19,20 @@ if TYPE_CHECKING:
 
     from odscen.base.arrays import BoolArray, FloatArray, Int32Array
     from odscen.convert.lane_table.table import LaneTable, SumoLight
+    from odscen.convert.model.conversion_settings import ConverterName
     from odscen.lanegraph.graphs import LaneGraph, MapGraph
     from odscen.lanegraph.parking_areas import MapParking
+    from odscen.scenario.document.signals_document import Control
 
 NORMAL = "normal"
 INTERNAL = "internal"
+
+NETWORK_CONTROLS: dict[ConverterName, Control | None] = {
+    "odscen": "extended",
+    "netconvert": "fixed",
+    "file": None,
+}
+"""How a network runs its lights, by who has written it; ``None`` if that is not known."""
 
 SHORT = 1.0
 """Lanes up to this length (m) may be missing in SUMO: routes lead over them all the same."""
@@ -51,6 +60,9 @@ class SumoMap:
         them, by SUMO lane.
     parking
         Where cars can park.
+    control
+        How the network itself runs its lights; ``None`` if that is not known, as of one from
+        outside.
     """
 
     graph: MapGraph
@@ -62,6 +74,7 @@ class SumoMap:
     lights: tuple[SumoLight, ...] = ()
     lane_names: Mapping[str, str] = field(default_factory=dict)
     parking: MapParking = NO_PARKING
+    control: Control | None = "extended"
 
     @cached_property
     def drivable(self) -> BoolArray:
@@ -100,8 +113,15 @@ class SumoMap:
         }
 
     @classmethod
-    def of(cls, graph: MapGraph, table: LaneTable, *, parking: MapParking = NO_PARKING) -> SumoMap:
-        """Bring graph and lane table together."""
+    def of(
+        cls,
+        graph: MapGraph,
+        table: LaneTable,
+        *,
+        parking: MapParking = NO_PARKING,
+        converter: ConverterName = "odscen",
+    ) -> SumoMap:
+        """Bring graph and lane table together; ``converter`` has written the network."""
         lanes, walks = graph.lanes, graph.walks
         net = _road_net(table)
         walk_keys = [
@@ -121,6 +141,7 @@ class SumoMap:
             lights=table.lights,
             lane_names=_lane_names(table),
             parking=parking,
+            control=NETWORK_CONTROLS[converter],
         )
 
 

@@ -75,12 +75,28 @@ def test_lights_are_known_by_their_junctions_and_their_movements_by_segments() -
     [
         {},
         {"junctions": [{"junction": JUNCTION}]},
-        {"junctions": [{"junction": JUNCTION, "control": "fixed", "green": [13, 13]}]},
-        {"control": "actuated", "junctions": [{"junction": JUNCTION, "control": "fixed"}]},
+        {"control": "extended"},
+        {"junctions": [{"junction": JUNCTION, "control": "extended", "green": [13, 13]}]},
+        {"control": "actuated", "junctions": [{"junction": JUNCTION, "control": "extended"}]},
     ],
 )
 def test_what_the_network_does_anyway_is_not_written(signals: dict[str, Any]) -> None:
     assert signals_text(**signals) is None
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [
+        {"control": "fixed"},
+        {"junctions": [{"junction": JUNCTION, "control": "fixed"}]},
+        {"junctions": [{"junction": JUNCTION, "green": [13, 13]}]},
+    ],
+)
+def test_fixed_times_are_those_of_the_map(signals: dict[str, Any]) -> None:
+    (logic,) = logics(**signals)
+    (light,) = crossing().table.lights
+    assert logic.get("type") == "static"
+    assert phases(logic) == [(p.name, f"{p.duration:g}", None, None) for p in light.phases]
 
 
 def test_other_greens_change_the_stages_and_nothing_else() -> None:
@@ -127,7 +143,7 @@ def test_extended_greens_are_those_of_the_map_at_least_and_share_what_is_left_of
     stages = [phase for phase in light.phases if phase.most > phase.least]
     more = round((120.0 - cycle) / len(stages), 1)
     assert more > 10.0
-    (logic,) = logics(control="extended")
+    logic = etree.fromstring(crossing().net_xml).find("tlLogic")
     assert logic.get("type") == "actuated"
     assert {row.get("key"): row.get("value") for row in logic.iterfind("param")}["max-gap"] == "2"
     assert phases(logic) == [

@@ -11,6 +11,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from odscen.convert.model.extended_greens import (
+    CONTROL_PARAM,
+    EXTENDED_PARAMS,
+    MAP_STAGES,
+    STAGES_PARAM,
+)
 from odscen.scenario.document.signals_document import JunctionTiming
 from odscen.scenario.signals.program_design import (
     ONLY_PLAN,
@@ -59,15 +65,6 @@ if TYPE_CHECKING:
 
 TYPES: dict[Control, str] = {"fixed": "static", "extended": "actuated", "actuated": "actuated"}
 """``type`` of a ``<tlLogic>``."""
-
-CONTROL_PARAM = "odscen.control"
-"""Parameter that says what control the program is meant to have."""
-
-STAGES_PARAM, MAP_STAGES = "odscen.stages", "map"
-"""Parameter of a program that calls or extends the stages of the map, and its value."""
-
-EXTENDING_GAP = 2.0
-"""Seconds between vehicles that end an extended green, as SUMO's ``max-gap``."""
 
 GROUP_PARAM = "odscen.group."
 """How parameters begin that name signal groups; their values are places in the states."""
@@ -133,6 +130,8 @@ def realized_lights(
     for light, view in zip(sumo_map.lights, scenario_lights(sumo_map), strict=True):
         own = [timings[name] for name in view.names if name in timings]
         timing = own[0] if own else JunctionTiming(junction=view.names[0])
+        if timing.green and len(timing.green) != len(view.green):  # of a network of before
+            timing = timing.model_copy(update={"green": ()})
         asked = signals.bus_priority if timing.bus_priority is None else timing.bus_priority
         control = signals.control_of(timing)
         realizing = _LightRealizer(light, view, timing, control, sumo_map, buses=asked)
@@ -144,7 +143,7 @@ def realized_lights(
 
 @lru_cache(maxsize=8)
 def _mapped_lights(
-    sumo_map: SumoMap, control: Control, *, buses: bool
+    sumo_map: SumoMap, control: Control | None, *, buses: bool
 ) -> tuple[RealizedLight, ...]:
     """All lights as the map has them: the same for all scenarios that say no more of them."""
     return tuple(
@@ -163,12 +162,14 @@ class _LightRealizer:
         light: SumoLight,
         view: Light,
         timing: JunctionTiming,
-        control: Control,
+        control: Control | None,
         sumo_map: SumoMap,
         *,
         buses: bool = False,
     ) -> None:
         self._buses = bus_areas(light, view, sumo_map.net) if buses else ()
+        self._is_as_in_network = not self._buses and control in (None, sumo_map.control)
+        control = control or sumo_map.control or "fixed"
         self._light = light
         self._view = view
         self._timing = timing
@@ -205,14 +206,14 @@ class _LightRealizer:
         shown = self._picture.program(
             self._picture.own_groups(), plans, loops, self._buses, own=False
         )
-        if not self._buses and self._control == "fixed" and not changed and offset == light.offset:
+        if self._is_as_in_network and not changed and offset == light.offset:
             return RealizedLight(shown)
         kind = "actuated" if self._buses else TYPES[self._control]
         params = self._loop_params(loops)
-        if called is not None or self._control == "extended":
+        if called is not None:
             params |= {STAGES_PARAM: MAP_STAGES}
         if self._control == "extended":
-            params |= {"max-gap": f"{EXTENDING_GAP:g}", CONTROL_PARAM: "extended"}
+            params |= EXTENDED_PARAMS
         start = started_offset(plan, offset)
         program = SumoProgram(ONLY_PLAN, kind, start, plan, conditions, params)
         return RealizedLight(shown, (program,), loops, buses=self._buses, areas=areas)

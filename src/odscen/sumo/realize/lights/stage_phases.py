@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+from odscen.convert.model.extended_greens import longer_by
 from odscen.convert.model.net import CROSSED, STAGE
 from odscen.convert.signals.signal_programs import LEAST_GREEN, PROLONGED
 from odscen.scenario.signals.program_design import (
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     from odscen.convert.lane_table.table import SumoLight
     from odscen.scenario.signals.program_design import DesignedProgram, PlannedStage, TimedPlan
     from odscen.sumo.realize.lights.light_detectors import BusArea
-
-LONGEST_CYCLE = 120.0
-"""Seconds of a cycle all of whose greens are extended to their end, as the longest in practice."""
 
 HOLD = "hold "
 """How the names of phases begin that hold a stage for one that was not called."""
@@ -105,14 +103,8 @@ def kept_phases(light: SumoLight, green: Sequence[float]) -> list[SumoPhase]:
 
 
 def extended_phases(phases: Sequence[SumoPhase]) -> list[SumoPhase]:
-    """Phases of which each green for vehicles may last longer, by as much as each other.
-
-    All together up to :data:`LONGEST_CYCLE`: greens in proportion would give most to those that
-    have most, though nothing is known of the demand.
-    """
-    greens = [phase for phase in phases if phase.prolonged]
-    free = max(0.0, LONGEST_CYCLE - sum(phase.seconds for phase in phases))
-    more = round(free / len(greens), 1) if greens else 0.0
+    """Phases of which each green for vehicles may last longer, by as much as each other."""
+    more = longer_by(phases, sum(phase.seconds for phase in phases))
     return [
         replace(phase, least=phase.seconds, most=phase.seconds + more) if phase.prolonged else phase
         for phase in phases
