@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 HOUR = 3600.0
 END = float(os.environ.get("ODSCEN_BENCH_SECONDS", HOUR))
 ONLY_ON = os.environ.get("ODSCEN_BENCH_LIGHTS") == "on"
-CONTROL = os.environ.get("ODSCEN_BENCH_CONTROL", "fixed")
+CONTROL = os.environ.get("ODSCEN_BENCH_CONTROL")
 """How our lights are run, as a scenario says it."""
 SPACING = 2.0
 FROM_ENDS = 15.0
@@ -153,12 +153,12 @@ def _maps() -> list[Path | str]:
     own = sorted((Path(__file__).parents[1] / "maps").glob("*.xodr"))
     shared = shared_maps()
     found = own + (sorted(shared.rglob("*.xodr")) if shared else [])
-    names = os.environ.get("ODSCEN_BENCH_MAPS", "")
+    names = [name for name in os.environ.get("ODSCEN_BENCH_MAPS", "").split(",") if name]
+    called = {path: {path.stem, f"{path.parent.name}/{path.stem}"} for path in found}
     if not names:
         return [*found]
-    known = {path.stem for path in found}
-    made = [name for name in names.split(",") if name not in known]
-    return [*(path for path in found if path.stem in names.split(",")), *made]
+    made = [name for name in names if not any(name in own for own in called.values())]
+    return [*(path for path in found if called[path] & set(names)), *made]
 
 
 def _bench_of(path: Path, folder: Path, label: str, *, places: Path) -> NetworkBench:
@@ -377,8 +377,11 @@ def _nearest(net: Any, x: float, y: float, heading: float) -> _Place | None:
     return None
 
 
-def build_own(path: Path, target: Path, *, control: str = "fixed") -> None:
-    """Write our network of an OpenDRIVE map, and how its lights are run with that control."""
+def build_own(path: Path, target: Path, *, control: str | None = None) -> None:
+    """Write our network of an OpenDRIVE map, and how its lights are run if a control is said.
+
+    Fixed times are in the network itself.
+    """
     from odscen.convert.building.network import build_network
     from odscen.lanegraph.build_graphs import build_map_graph
     from odscen.opendrive.lanes import RoadTable
@@ -393,8 +396,9 @@ def build_own(path: Path, target: Path, *, control: str = "fixed") -> None:
     table = RoadTable.of(odr)
     graph = build_map_graph(odr, name=path.stem, sha256="0" * 64, table=table)
     network = build_network(odr, table, graph.walks)
-    target.write_bytes(network.net_xml)
-    if control != "fixed":
+    fixed = network.net_xml.replace(b' type="actuated" ', b' type="static" ')
+    target.write_bytes(fixed if control == "fixed" else network.net_xml)
+    if control not in (None, "fixed"):
         lights = realized_lights(
             new_scenario(graph, name="control", roi=graph.segments.ids).model_copy(
                 update={"signals": Signals.model_validate({"control": control})}

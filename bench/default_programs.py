@@ -80,7 +80,7 @@ def _build_crossing(name: str, folder: Path) -> _Crossing:
         file = folder / f"{name}.xodr"
         file.write_text(map_text(name), encoding="utf-8")
     path = folder / "crossing.net.xml"
-    build_own(file, path)
+    build_own(file, path, control="fixed")
     net = sumolib.net.readNet(str(path))
     (light,) = net.getTrafficLights()
     exits: dict[str, dict[str, str]] = {}

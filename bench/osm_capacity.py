@@ -83,7 +83,7 @@ def _bench_of(extract: Path, name: str, folder: Path) -> NetworkBench | None:
     if len(places) * 2.0 / 1000.0 < LEAST_LANES:
         return None
     files = {kind: folder / f"{kind}.net.xml" for kind in ("ours", *PEERS)}
-    build_own(xodr, files["ours"])
+    build_own(xodr, files["ours"], control="fixed")
     projection = str(odr.header.geo_reference).strip()
     limited = folder / "limited.osm"
     limited.write_bytes(_with_limits(content))

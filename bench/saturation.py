@@ -118,7 +118,7 @@ def _saturation_table(folder: Path, steps: list[str], seeds: list[int]) -> list[
     """Print saturation flows; those of ``signal_crossing``, by step."""
     straight, crossing = folder / "straight.net.xml", folder / "crossing.net.xml"
     straight_road(straight)
-    build_own(MAPS / "signal_crossing.xodr", crossing)
+    build_own(MAPS / "signal_crossing.xodr", crossing, control="fixed")
     rows = {
         "straight, 50 km/h": (straight, "in out", "in_0", Drivers()),
         "signal_crossing": (crossing, "1.0.f 1.1.f 3.1.b 3.0.b", "1.1.f_1", Drivers()),
@@ -170,7 +170,7 @@ def build_without_crosswalks(name: str, folder: Path) -> Path:
     source.write_text(
         re.sub(r'<object [^>]*type="crosswalk".*?</object>', "", text, flags=re.DOTALL)
     )
-    build_own(source, net)
+    build_own(source, net, control="fixed")
     return net
 
 
@@ -194,7 +194,7 @@ def _permissive_table(
     print("\n| permissive left turn at lights, veh/h, and share of HCM's; step | oncoming |")
     print("|---|---|")
     net = folder / "lights.net.xml"
-    build_own(MAPS / "signal_crossing.xodr", net)
+    build_own(MAPS / "signal_crossing.xodr", net, control="fixed")
     for step, leaving in zip(steps, saturation, strict=True):
         cells = []
         for volume in VOLUMES:

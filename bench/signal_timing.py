@@ -283,11 +283,13 @@ class _Bench:
         for road, spawn in _entries(graph).items():
             volume = major if road in ("1", "3") else minor
             one = edits.add_flow(one, graph, spawn=spawn, per_hour=volume, mix=mix, end=until)
+        one = edits.set_signal_control(one, control="fixed")
         return edits.set_simulation(one, duration=until)
 
     def _avenue(self, seed: int) -> Scenario:
         graph = self._graph("town_5x5")
         one = edits.new_scenario(graph, name="avenue", roi=graph.segments.ids, seed=seed)
+        one = edits.set_signal_control(one, control="fixed")
         one = edits.set_simulation(one, duration=UNTIL)
         for first, last in (("r2", "r50"), ("r51", "r4")):
             spawn, goal = _through(graph, first, last)
